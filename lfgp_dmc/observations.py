@@ -1,0 +1,108 @@
+"""The 59 floats that every task and every agent share: one layout, one place.
+
+The order is the released code's, so that published data line up. An
+observation of our environments also carries `success/<task>` and
+`condition/<task>`, which are not part of the 59.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+OBSERVATION_SIZE = 59
+
+
+class Component(NamedTuple):
+  """Where a component of the paper's observation table sits in the 59."""
+
+  slices: tuple[slice, ...]
+  unit: str
+  privileged: bool  # True: needs the simulator's state, not a robot's sensors
+
+  @property
+  def size(self) -> int:
+    """Number of floats."""
+    return sum(part.stop - part.start for part in self.slices)
+
+
+def _component(*bounds: tuple[int, int], unit: str, privileged: bool):
+  slices = tuple(slice(start, stop) for start, stop in bounds)
+  return Component(slices, unit, privileged)
+
+
+# Name -> where, unit, privileged (the paper's table "obs_details"). Where a
+# component is in several slices, blue's part comes first, then green's.
+OBSERVATION_SLICES: dict[str, Component] = {
+  "ee_position": _component((0, 3), unit="m", privileged=False),
+  "ee_velocity": _component((3, 6), unit="m/s", privileged=False),
+  # Two fingers each: now, two steps ago, one step ago; 0 closed, 1 open.
+  "finger_positions": _component((6, 12), unit="1", privileged=False),
+  "block_positions": _component(
+    (12, 15), (19, 22), unit="m", privileged=True
+  ),
+  "block_rotations": _component(
+    (15, 19), (22, 26), unit="quaternion w x y z", privileged=True
+  ),
+  "block_linear_velocities": _component(
+    (26, 29), (32, 35), unit="m/s", privileged=True
+  ),
+  "block_angular_velocities": _component(
+    (29, 32), (35, 38), unit="rad/s", privileged=True
+  ),
+  "blocks_from_ee": _component((38, 44), unit="m", privileged=True),
+  "green_from_blue": _component((44, 47), unit="m", privileged=True),
+  "slots_from_blocks": _component((47, 53), unit="m", privileged=True),
+  # tanh(F / 100 N), tanh(T / 10 N m), at the wrist.
+  "force_torque": _component((53, 59), unit="tanh", privileged=False),
+}
+
+SUCCESS_PREFIX = "success/"
+CONDITION_PREFIX = "condition/"
+
+
+def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
+  """Lays the named observables out in the order of the released code.
+
+  Args:
+    observation: a timestep's observation with all eleven components.
+
+  Returns:
+    float32 [59].
+
+  Raises:
+    KeyError: a component is missing (vision leaves the privileged ones out).
+  """
+  flat = np.empty(OBSERVATION_SIZE, np.float32)
+  for name, component in OBSERVATION_SLICES.items():
+    try:
+      value = observation[name]
+    except KeyError:
+      raise KeyError(
+        f"observation lacks {name!r}; the 59 floats need "
+        f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
+      ) from None
+    start = 0
+    for part in component.slices:
+      stop = start + part.stop - part.start
+      flat[part] = value[start:stop]
+      start = stop
+  return flat
+
+
+def successes(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:
+  """Task -> has it succeeded (held long enough) since the episode began."""
+  return _flags(observation, SUCCESS_PREFIX)
+
+
+def conditions(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:
+  """Task -> does its success condition hold at this instant."""
+  return _flags(observation, CONDITION_PREFIX)
+
+
+def _flags(observation, prefix: str) -> dict[str, bool]:
+  return {
+    key.removeprefix(prefix): bool(value)
+    for key, value in observation.items()
+    if key.startswith(prefix)
+  }
