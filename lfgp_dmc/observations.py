@@ -38,9 +38,7 @@ OBSERVATION_SLICES: dict[str, Component] = {
   "ee_velocity": _component((3, 6), unit="m/s", privileged=False),
   # Two fingers each: now, two steps ago, one step ago; 0 closed, 1 open.
   "finger_positions": _component((6, 12), unit="1", privileged=False),
-  "block_positions": _component(
-    (12, 15), (19, 22), unit="m", privileged=True
-  ),
+  "block_positions": _component((12, 15), (19, 22), unit="m", privileged=True),
   "block_rotations": _component(
     (15, 19), (22, 26), unit="quaternion w x y z", privileged=True
   ),

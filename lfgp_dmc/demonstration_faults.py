@@ -1,0 +1,153 @@
+"""What can be wrong with one file of demonstrations, in words.
+
+Each check takes what was read and returns the faults it finds; none raises. A
+fault says what is there and what would be valid.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+SCHEMA_VERSION = 1
+COLLECTIONS = ("reset", "play")
+
+# Dataset name -> dtype. The shapes follow from N and the two widths.
+DTYPES = {
+  "observation": np.dtype(np.float32),
+  "action": np.dtype(np.float32),
+  "next_observation": np.dtype(np.float32),
+  "episode": np.dtype(np.int32),
+  "is_last": np.dtype(np.bool_),
+}
+_ATTRIBUTES = (
+  "schema_version",
+  "task",
+  "main_task",
+  "collection",
+  "expert",
+  "seed",
+  "control_hz",
+)
+
+
+def of_arrays(
+  arrays: Mapping[str, np.ndarray],
+  observation_size: int | None,
+  action_size: int | None,
+) -> list[str]:
+  """Faults of the five arrays.
+
+  Args:
+    arrays: name -> array, as read.
+    observation_size: O the environment asks for; None accepts any.
+    action_size: A the environment asks for; None accepts any.
+
+  Returns:
+    One phrase a fault; empty if there is none.
+  """
+  faults = [f"missing dataset {k!r}" for k in DTYPES if k not in arrays]
+  faults += _wrong_dtypes(arrays)
+  if faults:
+    return faults
+  faults += _wrong_shapes(arrays, observation_size, action_size)
+  if faults:
+    return faults
+  return _wrong_values(arrays) + _wrong_episodes(arrays)
+
+
+def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
+  """Faults of the attributes; `task` is the one expected (None: any)."""
+  faults = [f"missing attribute {k!r}" for k in _ATTRIBUTES
+            if k not in attributes]  # fmt: skip
+  if faults:
+    return faults
+  version = attributes["schema_version"]
+  if version != SCHEMA_VERSION:
+    faults.append(f"schema_version is {version!r}; valid: {SCHEMA_VERSION}")
+  if task is not None and attributes["task"] != task:
+    faults.append(f"task is {attributes['task']!r}; expected {task!r}")
+  if attributes["collection"] not in COLLECTIONS:
+    faults.append(
+      f"collection is {attributes['collection']!r}; "
+      f"valid: {', '.join(COLLECTIONS)}"
+    )
+  for name in ("task", "main_task", "expert"):
+    if not isinstance(attributes[name], str) or not attributes[name]:
+      faults.append(f"{name} is {attributes[name]!r}; valid: a name")
+  if not _is_number(attributes["seed"], np.integer, 0):
+    faults.append(f"seed is {attributes['seed']!r}; valid: an integer >= 0")
+  hertz = attributes["control_hz"]
+  if not _is_number(hertz, np.number, 0) or hertz == 0:
+    faults.append(f"control_hz is {hertz!r}; valid: a number above 0")
+  return faults
+
+
+def _is_number(value: Any, kind: type, least: float) -> bool:
+  array = np.asarray(value)
+  if array.shape or not np.issubdtype(array.dtype, kind):
+    return False
+  return bool(np.isfinite(array) and array >= least)
+
+
+def _wrong_dtypes(arrays: Mapping[str, np.ndarray]) -> list[str]:
+  return [
+    f"{name!r} is {arrays[name].dtype}; valid: {dtype}"
+    for name, dtype in DTYPES.items()
+    if name in arrays and arrays[name].dtype != dtype
+  ]
+
+
+def _wrong_shapes(arrays, observation_size, action_size) -> list[str]:
+  shape = arrays["observation"].shape
+  rows = shape[0] if shape else 0
+  if rows == 0:
+    return ["holds no pair; valid: at least one"]
+  observation = observation_size or (shape[1] if len(shape) == 2 else "O")
+  shape = arrays["action"].shape
+  action = action_size or (shape[1] if len(shape) == 2 else "A")
+  expected = {
+    "observation": (rows, observation),
+    "action": (rows, action),
+    "next_observation": (rows, observation),
+    "episode": (rows,),
+    "is_last": (rows,),
+  }
+  return [
+    f"{name!r} has shape {list(arrays[name].shape)}; valid: {list(valid)}"
+    for name, valid in expected.items()
+    if arrays[name].shape != valid
+  ]
+
+
+def _wrong_values(arrays: Mapping[str, np.ndarray]) -> list[str]:
+  faults = []
+  for name in ("observation", "action", "next_observation"):
+    finite = np.isfinite(arrays[name]).all(axis=1)
+    if not finite.all():
+      faults.append(
+        f"{name!r} has NaN or infinity in {np.sum(~finite)} rows, first in "
+        f"row {int(np.argmin(finite))}"
+      )
+  outside = (np.abs(arrays["action"]) > 1).any(axis=1)
+  if outside.any():
+    faults.append(
+      f"'action' leaves [-1, 1] in {np.sum(outside)} rows, first in row "
+      f"{int(np.argmax(outside))}"
+    )
+  return faults
+
+
+def _wrong_episodes(arrays: Mapping[str, np.ndarray]) -> list[str]:
+  episode, is_last = arrays["episode"], arrays["is_last"]
+  faults = []
+  if episode[0] < 0 or (np.diff(episode) < 0).any():
+    faults.append("'episode' is negative or decreases; valid: 0 0 0 1 1 ...")
+  # The row of success ends its episode; an episode cut short has none.
+  inside = is_last[:-1] & (episode[1:] == episode[:-1])
+  if inside.any():
+    faults.append(
+      f"'is_last' is true inside an episode, first in row "
+      f"{int(np.argmax(inside))}; valid: on an episode's final row only"
+    )
+  return faults

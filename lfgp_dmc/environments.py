@@ -1,0 +1,101 @@
+"""How any dm_env environment is read: flat observations, widths, rewards.
+
+Our nine tasks are laid out in the order of `observations.py`. Every other
+environment gets its floating-point observables end to end, in the order of its
+own specification; what belongs to tasks (`success/`, `condition/`, `reward/`)
+is never part of what a policy sees.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import dm_env
+import numpy as np
+
+from lfgp_dmc import observations
+
+REWARD_PREFIX = "reward/"
+_TASK_PREFIXES = (
+  observations.SUCCESS_PREFIX,
+  observations.CONDITION_PREFIX,
+  REWARD_PREFIX,
+)
+
+Flattener = Callable[[Any], np.ndarray]
+
+
+def flattener(environment: dm_env.Environment) -> Flattener:
+  """The function from this environment's observation to float32 [O].
+
+  Raises:
+    ValueError: the environment has no floating-point observable.
+  """
+  spec = environment.observation_spec()
+  if not isinstance(spec, Mapping):
+    return lambda observation: np.asarray(observation, np.float32).ravel()
+  if observations.OBSERVATION_SLICES.keys() <= spec.keys():
+    return observations.flatten
+  names = [
+    name
+    for name, part in spec.items()
+    if not name.startswith(_TASK_PREFIXES)
+    and np.issubdtype(part.dtype, np.floating)
+  ]
+  if not names:
+    raise ValueError(
+      "no floating-point observable to learn from; the environment offers: "
+      f"{', '.join(spec)}"
+    )
+
+  def flatten(observation: Mapping[str, Any]) -> np.ndarray:
+    parts = [np.ravel(observation[name]) for name in names]
+    return np.concatenate(parts, dtype=np.float32)
+
+  return flatten
+
+
+def widths(environment: dm_env.Environment) -> tuple[int, int]:
+  """The sizes (O, A) of flat observations and of actions."""
+  spec = environment.observation_spec()
+  flatten = flattener(environment)
+  if isinstance(spec, Mapping):
+    example: Any = {
+      name: np.zeros(part.shape, part.dtype) for name, part in spec.items()
+    }
+  else:
+    example = np.zeros(spec.shape, spec.dtype)
+  action_size = int(np.prod(environment.action_spec().shape))
+  return len(flatten(example)), action_size
+
+
+def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
+  """Each task's reward of this step.
+
+  Args:
+    timestep: any step but the first of an episode.
+    tasks: K names.
+
+  Returns:
+    float32 [K]: the observable `reward/<task>`, or where the environment does
+    not show it, the environment's own reward.
+  """
+  own = 0.0 if timestep.reward is None else float(timestep.reward)
+  shown = timestep.observation
+  if not isinstance(shown, Mapping):
+    shown = {}
+  rewards = [float(shown.get(REWARD_PREFIX + task, own)) for task in tasks]
+  return np.asarray(rewards, np.float32)
+
+
+def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:
+  """Whether `task` has succeeded; None if the environment cannot tell."""
+  shown = timestep.observation
+  if not isinstance(shown, Mapping):
+    return None
+  value = shown.get(observations.SUCCESS_PREFIX + task)
+  return None if value is None else bool(np.all(value))
+
+
+def is_physics_failure(timestep: dm_env.TimeStep) -> bool:
+  """Whether the simulation broke: Composer's LAST with discount 0."""
+  return bool(timestep.last() and timestep.discount == 0)

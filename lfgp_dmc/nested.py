@@ -1,0 +1,74 @@
+"""Nested state <-> flat arrays and a JSON tree.
+
+A learner's state is dicts and lists whose leaves are NumPy arrays or JSON
+values. Arrays go to one flat dict under names like `critic/optimizer/0`; in the
+tree their place is kept by `{"__array__": name}`. Tuples come back as lists.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+_ARRAY = "__array__"
+_ITEMS = "__items__"  # a dict whose keys are not all text
+
+
+def pack(state: Any) -> tuple[dict[str, np.ndarray], Any]:
+  """Splits a nested state.
+
+  Args:
+    state: dicts, lists and tuples of arrays, numbers, text, booleans, None.
+
+  Returns:
+    The arrays by flat name, and the JSON-able tree.
+
+  Raises:
+    TypeError: a leaf of another type; the message says where.
+  """
+  arrays: dict[str, np.ndarray] = {}
+  return arrays, _pack(state, "", arrays)
+
+
+def unpack(arrays: Mapping[str, np.ndarray], tree: Any) -> Any:
+  """Puts back together what `pack` split.
+
+  Raises:
+    KeyError: an array that the tree names is not there.
+  """
+  if isinstance(tree, list):
+    return [unpack(arrays, item) for item in tree]
+  if not isinstance(tree, dict):
+    return tree
+  if tree.keys() == {_ARRAY}:
+    return arrays[tree[_ARRAY]]
+  if tree.keys() == {_ITEMS}:
+    return {key: unpack(arrays, value) for key, value in tree[_ITEMS]}
+  return {key: unpack(arrays, value) for key, value in tree.items()}
+
+
+def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:
+  if isinstance(value, np.ndarray):
+    unique = name
+    while unique in arrays:  # the keys 0 and "0" would share a name
+      unique += "_"
+    arrays[unique] = value
+    return {_ARRAY: unique}
+  if isinstance(value, np.generic):
+    return value.item()
+  if isinstance(value, Mapping):
+    packed = [
+      (key, _pack(item, f"{name}/{key}" if name else str(key), arrays))
+      for key, item in value.items()
+    ]
+    if all(isinstance(key, str) for key in value):
+      return dict(packed)
+    return {_ITEMS: [list(pair) for pair in packed]}
+  if isinstance(value, list | tuple):
+    return [_pack(v, f"{name}/{i}", arrays) for i, v in enumerate(value)]
+  if value is None or isinstance(value, bool | int | float | str):
+    return value
+  raise TypeError(
+    f"state {name!r} is a {type(value).__name__}; only arrays and JSON values "
+    "can be stored"
+  )
