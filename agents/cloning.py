@@ -1,0 +1,72 @@
+"""Behaviour cloning of all intentions: warm starts, and BC itself."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+
+from agents import serialisation
+from agents.experts import ExpertBatch
+from agents.losses.behaviour_cloning import behaviour_cloning_loss
+from agents.networks.intentions import IntentionNetwork
+from agents.optimisation import clipped_step, make_optimiser
+
+
+class IntentionCloner:
+  """Trains trunk and heads of an `IntentionNetwork` on expert pairs alone."""
+
+  def __init__(
+    self,
+    network: IntentionNetwork,
+    learning_rate: float,
+    weight_decay: float = 0.0,
+    max_gradient_norm: float = math.inf,
+    bfloat16: bool = False,
+  ):
+    """Makes the optimiser.
+
+    Args:
+      network: what to train; its trunk is trained if it owns it.
+      learning_rate: step size of Adam.
+      weight_decay: above 0: AdamW with this decay.
+      max_gradient_norm: bound on the gradient's norm.
+      bfloat16: compute products in bfloat16.
+    """
+    self._network = network
+    self._parameters = network.trained_parameters()
+    self._optimiser = make_optimiser(
+      self._parameters, learning_rate, weight_decay
+    )
+    self._max_gradient_norm = max_gradient_norm
+    self._bfloat16 = bfloat16
+
+  def loss(self, batch: ExpertBatch) -> tuple[torch.Tensor, dict]:
+    """The loss of a batch; see `behaviour_cloning_loss`."""
+    device = batch.inputs.device.type
+    with torch.autocast(device, torch.bfloat16, enabled=self._bfloat16):
+      mean, _ = self._network(batch.inputs)
+    return behaviour_cloning_loss(mean, batch.action)
+
+  def update(self, batch: ExpertBatch) -> dict[str, torch.Tensor]:
+    """Makes one update.
+
+    Args:
+      batch: each task's own pairs.
+
+    Returns:
+      The metrics of `behaviour_cloning_loss`.
+    """
+    loss, metrics = self.loss(batch)
+    clipped_step(
+      self._optimiser, loss, self._parameters, self._max_gradient_norm
+    )
+    return metrics
+
+  def state_dict(self) -> dict[str, Any]:
+    """The optimiser's moments (the network is the caller's)."""
+    return {"optimiser": serialisation.optimiser_state(self._optimiser)}
+
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned."""
+    serialisation.load_optimiser_state(self._optimiser, state["optimiser"])

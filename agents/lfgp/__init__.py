@@ -1,0 +1,6 @@
+"""Learning from Guided Play: the paper's agent (Algorithm 1)."""
+
+from agents.lfgp.agent import LfgpAgent, build
+from agents.lfgp.config import LfgpConfig
+
+__all__ = ["LfgpAgent", "LfgpConfig", "build"]

@@ -1,0 +1,177 @@
+"""Every setting of the LfGP agent, checked when it is made."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from agents import rewards, schedulers
+from agents.networks import discriminator
+
+ACTOR_TRUNKS = ("shared", "own")
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class LfgpConfig:
+  """Defaults are the paper's hyper-parameter table for AIL algorithms."""
+
+  # Loop, in environment steps.
+  warm_up: int = 1000  # transitions before the first update
+  random_steps: int = 1000  # first steps with actions from U[-1, 1]
+  updates_per_step: float = 1.0  # the training loop holds this ratio
+  episode_steps: int = 360  # sets the scheduler's choices an episode
+
+  # Networks.
+  hidden_size: int = 256
+  actor_trunk: str = "shared"  # "own": a second trunk, trained by the policy
+  critic_layer_norm: bool = False
+  standardise: bool = False  # inputs by the demonstrations' mean, deviation
+  deviation_floor: float = 0.01  # smallest deviation, in the input's unit
+  bfloat16: bool = False  # products in bfloat16 (autocast)
+
+  # Intentions and critics.
+  batch_size: int = 256
+  discount: float = 0.99  # gamma, a step
+  polyak: float = 0.005  # share of the online network
+  critic_learning_rate: float = 3e-4
+  intention_learning_rate: float = 1e-5
+  temperature_learning_rate: float = 3e-4
+  initial_temperature: float = 1.0  # alpha
+  target_entropy: float = -4.0  # nats
+  max_gradient_norm: float = 10.0  # critics, intentions, log alpha apart
+  weight_decay: float = 0.0  # above 0: AdamW, on all but alpha
+
+  # Discriminators and their reward.
+  discriminator_learning_rate: float = 3e-4
+  discriminator_batch_size: int = 256  # expert pairs a task
+  discriminator_input: str = "state_action"  # or "state"
+  discriminator_noise: float = 0.0  # on observations, in deviations
+  discriminator_every: int = 1  # updates between its updates
+  discriminator_final_share: float = 0.0  # of expert pairs, rows of success
+  gradient_penalty: float = 10.0  # lambda
+  gradient_penalty_per_task: bool = False
+  reward: str = "logit"  # see agents/rewards.py
+  reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
+  reward_scale: float = 1.0
+
+  # Scheduler.
+  scheduler: str = "q_table"
+  xi: int = 45  # steps a choice
+  scheduler_phi: float = 0.6
+  scheduler_temperature: float = 360.0
+  scheduler_decay: float = 0.9995
+  scheduler_minimum: float = 0.1
+  main_weight: float = 0.5  # weighted random: the main task's
+  handcrafted_probability: float = 0.5
+
+  # Use of demonstrations beyond the discriminators.
+  expert_share: float = 0.0  # of the critics' and intentions' batch
+  expert_share_decay: float = 1.0  # factor an update
+  bc_weight: float = 0.0  # BC term in the intentions' loss
+  bc_normalise: bool = False  # times each task's mean |Q|
+  bc_decay: float = 1.0  # factor on the weight an update
+  bc_warm_start_updates: int = 0  # pure BC before the first step
+  bc_learning_rate: float = 3e-4  # of the warm start
+
+  def __post_init__(self):
+    """Raises ValueError that lists every field out of its range."""
+    faults = [
+      f"{name} is {getattr(self, name)!r}; valid: {valid}"
+      for valid, (is_valid, names) in _RANGES.items()
+      for name in names.split()
+      if not is_valid(getattr(self, name))
+    ]
+    faults += [
+      f"{name} is {getattr(self, name)!r}; valid: {', '.join(choices)}"
+      for name, choices in _CHOICES.items()
+      if getattr(self, name) not in choices
+    ]
+    if self.discriminator_noise and not self.standardise:
+      faults.append(
+        f"discriminator_noise is {self.discriminator_noise!r}; valid: 0 "
+        "unless standardise is True (its unit is the standardised input's)"
+      )
+    if faults:
+      raise ValueError(f"LfgpConfig: {'; '.join(faults)}")
+
+  @classmethod
+  def from_mapping(cls, values: Mapping[str, Any]) -> "LfgpConfig":
+    """Makes a config from field names and values.
+
+    Raises:
+      ValueError: a name is no field, or a value is out of its range.
+    """
+    names = {field.name for field in dataclasses.fields(cls)}
+    unknown = sorted(set(values) - names)
+    if unknown:
+      raise ValueError(
+        f"LfgpConfig has no {', '.join(unknown)}; valid: "
+        f"{', '.join(sorted(names))}"
+      )
+    return cls(**values)
+
+
+def _is_integer(value: Any) -> bool:
+  return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _is_number(value: Any) -> bool:
+  is_number = isinstance(value, int | float) and not isinstance(value, bool)
+  return is_number and abs(value) < float("inf")  # false for NaN
+
+
+_INTEGERS_ABOVE_0 = (
+  "warm_up episode_steps hidden_size batch_size xi "
+  "discriminator_batch_size discriminator_every"
+)
+_NUMBERS_ABOVE_0 = (
+  "updates_per_step deviation_floor critic_learning_rate "
+  "intention_learning_rate temperature_learning_rate initial_temperature "
+  "max_gradient_norm reward_scale discriminator_learning_rate "
+  "bc_learning_rate scheduler_temperature scheduler_minimum"
+)
+_NUMBERS_FROM_0 = (
+  "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight"
+)
+_SHARES = (
+  "discount discriminator_final_share expert_share expert_share_decay "
+  "bc_decay scheduler_phi main_weight handcrafted_probability"
+)
+_SWITCHES = (
+  "critic_layer_norm standardise bfloat16 bc_normalise "
+  "gradient_penalty_per_task"
+)
+# What is valid -> test, names of fields.
+_RANGES: dict[str, tuple[Callable[[Any], bool], str]] = {
+  "an integer above 0": (
+    lambda value: _is_integer(value) and value > 0,
+    _INTEGERS_ABOVE_0,
+  ),
+  "an integer, 0 or more": (
+    lambda value: _is_integer(value) and value >= 0,
+    "random_steps bc_warm_start_updates",
+  ),
+  "a number above 0": (
+    lambda value: _is_number(value) and value > 0,
+    _NUMBERS_ABOVE_0,
+  ),
+  "a number, 0 or more": (
+    lambda value: _is_number(value) and value >= 0,
+    _NUMBERS_FROM_0,
+  ),
+  "a number": (_is_number, "target_entropy"),
+  "a number from 0 to 1": (
+    lambda value: _is_number(value) and 0 <= value <= 1,
+    _SHARES,
+  ),
+  "a number above 0, at most 1": (
+    lambda value: _is_number(value) and 0 < value <= 1,
+    "polyak scheduler_decay",
+  ),
+  "True or False": (lambda value: isinstance(value, bool), _SWITCHES),
+}
+_CHOICES: dict[str, tuple[str, ...]] = {
+  "actor_trunk": ACTOR_TRUNKS,
+  "discriminator_input": discriminator.INPUTS,
+  "reward": tuple(rewards.VARIANTS),
+  "scheduler": schedulers.NAMES,
+}

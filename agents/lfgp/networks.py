@@ -1,0 +1,85 @@
+"""All networks of the LfGP learner, drawn from one generator."""
+
+import copy
+import dataclasses
+
+import torch
+from torch import nn
+
+from agents.lfgp.config import LfgpConfig
+from agents.networks.critics import CriticNetwork, TwinCriticHeads
+from agents.networks.discriminator import Discriminator
+from agents.networks.intentions import IntentionHeads, IntentionNetwork
+from agents.networks.trunk import Standardiser, Trunk
+
+
+@dataclasses.dataclass
+class LfgpNetworks:
+  """What the learner trains; with a shared trunk, intentions' = critics'."""
+
+  intentions: IntentionNetwork
+  critics: CriticNetwork
+  target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
+  discriminator: Discriminator
+  log_temperature: nn.Parameter  # [K]
+
+  def modules(self) -> dict[str, nn.Module]:
+    """The modules by the names used in checkpoints."""
+    return {
+      "intentions": self.intentions,
+      "critics": self.critics,
+      "target_critics": self.target_critics,
+      "discriminator": self.discriminator,
+    }
+
+
+def make_networks(
+  config: LfgpConfig,
+  tasks: int,
+  observations: int,
+  actions: int,
+  standardiser: Standardiser,
+  generator: torch.Generator,
+  device: torch.device,
+) -> LfgpNetworks:
+  """Draws all networks.
+
+  Args:
+    config: sizes and options.
+    tasks: K.
+    observations: O.
+    actions: A.
+    standardiser: raw observation -> input.
+    generator: a CPU generator, source of the initial numbers.
+    device: where to put the networks.
+
+  Returns:
+    The networks. The intentions own their trunk if the config says so, or if
+    a warm start by behaviour cloning has to train it.
+  """
+  hidden = config.hidden_size
+  trunk = Trunk(observations, hidden, generator)
+  critics = CriticNetwork(
+    trunk,
+    TwinCriticHeads(
+      tasks, hidden, hidden, actions, generator, config.critic_layer_norm
+    ),
+  ).to(device)
+  owns_trunk = config.actor_trunk == "own" or config.bc_warm_start_updates > 0
+  intentions = IntentionNetwork(
+    standardiser,
+    Trunk(observations, hidden, generator) if owns_trunk else trunk,
+    IntentionHeads(tasks, hidden, hidden, actions, generator),
+    owns_trunk,
+  ).to(device)
+  discriminator = Discriminator(
+    tasks, observations, actions, hidden, generator, config.discriminator_input
+  ).to(device)
+  initial = torch.tensor(config.initial_temperature).log()
+  return LfgpNetworks(
+    intentions=intentions,
+    critics=critics,
+    target_critics=copy.deepcopy(critics).requires_grad_(False),
+    discriminator=discriminator,
+    log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
+  )

@@ -1,0 +1,4 @@
+"""Losses as pure functions: tensors in, `(loss, metrics)` out.
+
+Metrics are detached tensors, `[K]` for what differs by task, else scalars.
+"""

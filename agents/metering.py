@@ -1,0 +1,69 @@
+"""Means of metrics over updates, read from the device only when asked."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+
+class Meter:
+  """Sums tensors by name; names and columns are fixed from the start."""
+
+  def __init__(
+    self,
+    tasks: Sequence[str],
+    scalars: Sequence[str],
+    by_task: Sequence[str],
+    device: torch.device | str = "cpu",
+  ):
+    """Starts empty.
+
+    Args:
+      tasks: names of the K tasks.
+      scalars: names of metrics with one value.
+      by_task: names of metrics with K values, reported as `name/<task>`.
+      device: where the metrics come from.
+    """
+    self._tasks = tuple(tasks)
+    size = len(self._tasks)
+    self._sums = {name: torch.zeros((), device=device) for name in scalars}
+    self._sums |= {name: torch.zeros(size, device=device) for name in by_task}
+    self._counts = dict.fromkeys(self._sums, 0)
+
+  def add(self, metrics: Mapping[str, torch.Tensor]) -> None:
+    """Adds one update's metrics; KeyError for a name not announced."""
+    for name, value in metrics.items():
+      self._sums[name].add_(value)
+      self._counts[name] += 1
+
+  def read(self) -> dict[str, float]:
+    """Means since the last call, NaN where nothing came; starts anew."""
+    means: dict[str, float] = {}
+    for name, total in self._sums.items():
+      count = self._counts[name]
+      values = total.tolist() if total.dim() else [total.item()]
+      values = [value / count if count else float("nan") for value in values]
+      if total.dim():
+        means |= {
+          f"{name}/{task}": value
+          for task, value in zip(self._tasks, values, strict=True)
+        }
+      else:
+        means[name] = values[0]
+      total.zero_()
+      self._counts[name] = 0
+    return means
+
+  def state_dict(self) -> dict[str, Any]:
+    """The sums and counts since the last `read`."""
+    return {
+      "sums": {k: v.cpu().numpy().copy() for k, v in self._sums.items()},
+      "counts": dict(self._counts),
+    }
+
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned."""
+    for name, total in self._sums.items():
+      total.copy_(torch.from_numpy(np.array(state["sums"][name])))
+      self._counts[name] = int(state["counts"][name])

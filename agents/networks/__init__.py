@@ -1,0 +1,1 @@
+"""Networks of the paper's supplement, per-task heads stacked in one tensor."""

@@ -1,0 +1,96 @@
+"""The twin critics: a trunk and two Q heads a task, stacked in one tensor."""
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from agents.networks.linear import StackedLinear, initialise_
+from agents.networks.trunk import Trunk
+
+
+class TwinCriticHeads(nn.Module):
+  """2K heads [features, action] -> H ReLU -> 1.
+
+  The first layer is kept in two parts, for features and for actions, so that
+  the derivative by the action alone costs no product with the features' part.
+  """
+
+  def __init__(
+    self,
+    tasks: int,
+    features: int,
+    hidden: int,
+    actions: int,
+    generator: torch.Generator,
+    layer_norm: bool = False,
+  ):
+    """Draws all heads.
+
+    Args:
+      tasks: K.
+      features: outputs of the trunk.
+      hidden: H, units of the hidden layer.
+      actions: A.
+      generator: source of the initial numbers.
+      layer_norm: normalise the hidden layer before its ReLU, with a gain and
+        a bias for each head (not in the paper).
+    """
+    super().__init__()
+    self.tasks = tasks
+    groups, fan_in = 2 * tasks, features + actions
+    self.feature_weight = nn.Parameter(torch.empty(groups, features, hidden))
+    self.action_weight = nn.Parameter(torch.empty(groups, actions, hidden))
+    self.bias = nn.Parameter(torch.empty(groups, 1, hidden))
+    for parameter in (self.feature_weight, self.action_weight, self.bias):
+      initialise_(parameter, fan_in, generator)
+    self.output = StackedLinear(groups, hidden, 1, generator)
+    self.gain = self.shift = None
+    if layer_norm:
+      self.gain = nn.Parameter(torch.ones(groups, 1, hidden))
+      self.shift = nn.Parameter(torch.zeros(groups, 1, hidden))
+
+  def forward(
+    self, features: torch.Tensor, action: torch.Tensor
+  ) -> torch.Tensor:
+    """Both values of each task for that task's action.
+
+    Args:
+      features: [B, H], the same rows in every task.
+      action: [B, A] for the same action in every task, or [K, B, A].
+
+    Returns:
+      float32 [2, K, B].
+    """
+    groups, rows = 2 * self.tasks, features.shape[0]
+    if action.dim() == 3:
+      action = action.repeat(2, 1, 1)
+    hidden = torch.baddbmm(
+      self.bias, features.expand(groups, *features.shape), self.feature_weight
+    )
+    hidden = torch.baddbmm(
+      hidden, action.expand(groups, rows, action.shape[-1]), self.action_weight
+    )
+    if self.gain is not None and self.shift is not None:
+      hidden = functional.layer_norm(hidden, hidden.shape[-1:])
+      hidden = hidden * self.gain + self.shift
+    value = self.output(torch.relu(hidden))
+    return value.float().reshape(2, self.tasks, rows)
+
+
+class CriticNetwork(nn.Module):
+  """Trunk and twin heads: the target network is a copy of the whole."""
+
+  def __init__(self, trunk: Trunk, heads: TwinCriticHeads):
+    """Puts the parts together.
+
+    Args:
+      trunk: inputs [B, O] -> features [B, H].
+      heads: features and actions -> values.
+    """
+    super().__init__()
+    self.trunk = trunk
+    self.heads = heads
+
+  def forward(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
+    """Values [2, K, B] of inputs [B, O] and actions [B, A] or [K, B, A]."""
+    return self.heads(self.trunk(inputs), action)

@@ -1,0 +1,109 @@
+"""The intentions: a trunk and one policy head a task (low-level policies)."""
+
+import torch
+from torch import nn
+from torch.nn import functional
+
+from agents.networks.linear import StackedLinear
+from agents.networks.trunk import Standardiser, Trunk
+
+DEVIATION_FLOOR = 1e-7  # the paper's epsilon against underflow
+
+
+class IntentionHeads(nn.Module):
+  """K heads H -> H ReLU -> 2A: the mean and raw deviation of a Gaussian."""
+
+  def __init__(
+    self,
+    tasks: int,
+    features: int,
+    hidden: int,
+    actions: int,
+    generator: torch.Generator,
+  ):
+    """Draws all heads.
+
+    Args:
+      tasks: K.
+      features: outputs of the trunk.
+      hidden: H, units of the hidden layer.
+      actions: A.
+      generator: source of the initial numbers.
+    """
+    super().__init__()
+    self.hidden = StackedLinear(tasks, features, hidden, generator)
+    self.output = StackedLinear(tasks, hidden, 2 * actions, generator)
+
+  def forward(
+    self, features: torch.Tensor
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """Every intention's Gaussian, before the tanh.
+
+    Args:
+      features: [B, H] for the same rows in every task, or [K, B, H].
+
+    Returns:
+      Mean and standard deviation, float32 [K, B, A] each.
+    """
+    return split(self.output(torch.relu(self.hidden(features))))
+
+  def one(
+    self, features: torch.Tensor, task: int
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """One task's Gaussian for features [B, H]: mean, raw deviation [B, A]."""
+    output = self.output.one(torch.relu(self.hidden.one(features, task)), task)
+    mean, raw = output.chunk(2, dim=-1)
+    return mean, raw
+
+
+def to_deviation(raw: torch.Tensor) -> torch.Tensor:
+  """softplus(raw) + 1e-7: a standard deviation, with no other clamp."""
+  return functional.softplus(raw) + DEVIATION_FLOOR
+
+
+def split(output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+  """Splits a head's [..., 2A] into mean and deviation, float32 [..., A]."""
+  mean, raw = output.float().chunk(2, dim=-1)
+  return mean, to_deviation(raw)
+
+
+class IntentionNetwork(nn.Module):
+  """All that acting needs: standardisation, trunk, heads."""
+
+  def __init__(
+    self,
+    standardiser: Standardiser,
+    trunk: Trunk,
+    heads: IntentionHeads,
+    owns_trunk: bool,
+  ):
+    """Puts the parts together; the trunk may be the critics' own module.
+
+    Args:
+      standardiser: raw observation -> input.
+      trunk: input -> features.
+      heads: features -> Gaussians.
+      owns_trunk: whether losses of the intentions train the trunk. False: it
+        is the critics', and no gradient of ours reaches it.
+    """
+    super().__init__()
+    self.standardiser = standardiser
+    self.trunk = trunk
+    self.heads = heads
+    self.owns_trunk = owns_trunk
+
+  def trained_parameters(self) -> list[nn.Parameter]:
+    """The parameters that the intentions' losses train."""
+    trunk = list(self.trunk.parameters()) if self.owns_trunk else []
+    return [*trunk, *self.heads.parameters()]
+
+  def features(self, inputs: torch.Tensor) -> torch.Tensor:
+    """Features [..., H] of standardised inputs [..., O]."""
+    if self.owns_trunk:
+      return self.trunk(inputs)
+    with torch.no_grad():
+      return self.trunk(inputs)
+
+  def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Mean and deviation [K, B, A] for inputs [B, O] or [K, B, O]."""
+    return self.heads(self.features(inputs))

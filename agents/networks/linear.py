@@ -1,0 +1,72 @@
+"""Linear layers with an explicit generator: single, and stacked by task."""
+
+import math
+
+import torch
+from torch import nn
+
+
+def initialise_(
+  parameter: torch.Tensor, fan_in: int, generator: torch.Generator
+) -> torch.Tensor:
+  """Fills weights or biases as `torch.nn.Linear` does, in place.
+
+  Args:
+    parameter: tensor of any shape.
+    fan_in: inputs of one layer, 1 or more.
+    generator: source of the numbers.
+
+  Returns:
+    `parameter`, uniform within +-1 / sqrt(fan_in).
+  """
+  bound = 1.0 / math.sqrt(fan_in)
+  with torch.no_grad():
+    return parameter.uniform_(-bound, bound, generator=generator)
+
+
+def make_linear(
+  inputs: int, outputs: int, generator: torch.Generator
+) -> nn.Linear:
+  """A `torch.nn.Linear` with its default bounds, drawn from `generator`."""
+  layer: nn.Linear = nn.utils.skip_init(nn.Linear, inputs, outputs)
+  initialise_(layer.weight, inputs, generator)
+  initialise_(layer.bias, inputs, generator)
+  return layer
+
+
+class StackedLinear(nn.Module):
+  """G linear layers of one shape, applied by one batched product."""
+
+  def __init__(
+    self, groups: int, inputs: int, outputs: int, generator: torch.Generator
+  ):
+    """Draws each layer as `torch.nn.Linear` with its own fan-in.
+
+    Args:
+      groups: G, the number of layers.
+      inputs: fan-in of each layer.
+      outputs: outputs of each layer.
+      generator: source of the initial numbers.
+    """
+    super().__init__()
+    self.weight = nn.Parameter(torch.empty(groups, inputs, outputs))
+    self.bias = nn.Parameter(torch.empty(groups, 1, outputs))
+    initialise_(self.weight, inputs, generator)
+    initialise_(self.bias, inputs, generator)
+
+  def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+    """Applies layer g to group g.
+
+    Args:
+      inputs: [G, B, I], or [B, I] for the same rows in every group.
+
+    Returns:
+      [G, B, outputs].
+    """
+    if inputs.dim() == 2:
+      inputs = inputs.expand(self.weight.shape[0], *inputs.shape)
+    return torch.baddbmm(self.bias, inputs, self.weight)
+
+  def one(self, inputs: torch.Tensor, group: int) -> torch.Tensor:
+    """Applies layer `group` alone to [B, I]; returns [B, outputs]."""
+    return torch.addmm(self.bias[group], inputs, self.weight[group])

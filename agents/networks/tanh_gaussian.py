@@ -1,0 +1,38 @@
+"""The tanh-squashed Gaussian of soft actor-critic."""
+
+import math
+
+import torch
+from torch.nn import functional
+
+_LOG_SQRT_2_PI = 0.5 * math.log(2.0 * math.pi)
+_LOG_2 = math.log(2.0)
+
+
+def log_one_minus_tanh_squared(value: torch.Tensor) -> torch.Tensor:
+  """log(1 - tanh(value)^2) without loss of digits at large |value|."""
+  return 2.0 * (_LOG_2 - value - functional.softplus(-2.0 * value))
+
+
+def sample(
+  mean: torch.Tensor, deviation: torch.Tensor, noise: torch.Tensor
+) -> tuple[torch.Tensor, torch.Tensor]:
+  """Draws actions by the reparameterisation trick.
+
+  Args:
+    mean: [..., A], before the tanh.
+    deviation: [..., A], standard deviation, above 0.
+    noise: [..., A], from N(0, 1).
+
+  Returns:
+    The actions tanh(mean + deviation * noise), [..., A] within [-1, 1], and
+    their log densities, [...].
+  """
+  value = mean + deviation * noise
+  log_prob = (
+    -0.5 * noise * noise
+    - torch.log(deviation)
+    - _LOG_SQRT_2_PI
+    - log_one_minus_tanh_squared(value)
+  )
+  return torch.tanh(value), log_prob.sum(-1)

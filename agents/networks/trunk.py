@@ -1,0 +1,61 @@
+"""The shared first layers, and the standardisation of what goes into them."""
+
+import numpy as np
+import torch
+from torch import nn
+
+from agents.networks.linear import make_linear
+
+
+class Standardiser(nn.Module):
+  """Maps raw observations to network inputs: (x - mean) / deviation."""
+
+  mean: torch.Tensor
+  deviation: torch.Tensor
+
+  def __init__(self, size: int):
+    """Starts as the identity.
+
+    Args:
+      size: O, floats of an observation.
+    """
+    super().__init__()
+    self.register_buffer("mean", torch.zeros(size))
+    self.register_buffer("deviation", torch.ones(size))
+
+  def fit(self, observation: np.ndarray, floor: float) -> None:
+    """Takes mean and deviation from demonstrations.
+
+    Args:
+      observation: [N, O].
+      floor: smallest deviation used, in the observation's own units; it keeps
+        floats that hardly move from being blown up.
+    """
+    mean = observation.mean(0, dtype=np.float64)
+    deviation = np.maximum(observation.std(0, dtype=np.float64), floor)
+    self.mean.copy_(torch.from_numpy(mean))
+    self.deviation.copy_(torch.from_numpy(deviation))
+
+  def forward(self, observation: torch.Tensor) -> torch.Tensor:
+    """Returns standardised [..., O]."""
+    return (observation - self.mean) / self.deviation
+
+
+class Trunk(nn.Module):
+  """Two layers with ReLU, O -> H -> H, shared by all tasks."""
+
+  def __init__(self, inputs: int, hidden: int, generator: torch.Generator):
+    """Draws both layers.
+
+    Args:
+      inputs: O, floats of an observation.
+      hidden: H, units of each layer.
+      generator: source of the initial numbers.
+    """
+    super().__init__()
+    self.first = make_linear(inputs, hidden, generator)
+    self.second = make_linear(hidden, hidden, generator)
+
+  def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+    """Maps inputs [..., O] to features [..., H]."""
+    return torch.relu(self.second(torch.relu(self.first(inputs))))

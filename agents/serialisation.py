@@ -1,0 +1,93 @@
+"""States as nested dicts of NumPy arrays and JSON-able values."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from torch import nn
+
+
+def module_state(module: nn.Module) -> dict[str, np.ndarray]:
+  """A module's parameters and buffers by name, copied."""
+  return {
+    name: tensor.detach().cpu().numpy().copy()
+    for name, tensor in module.state_dict().items()
+  }
+
+
+def load_module_state(
+  module: nn.Module, state: Mapping[str, np.ndarray], what: str
+) -> None:
+  """Copies named arrays into a module, in place.
+
+  Args:
+    module: where to.
+    state: name -> array, every parameter and buffer.
+    what: the module's name in error messages.
+
+  Raises:
+    ValueError: names or shapes differ; the message lists each fault.
+  """
+  own = module.state_dict()
+  faults = [f"{name} is missing" for name in own if name not in state]
+  faults += [f"{name} is not known" for name in state if name not in own]
+  faults += [
+    f"{name} has shape {list(state[name].shape)}, not {list(tensor.shape)}"
+    for name, tensor in own.items()
+    if name in state and tuple(state[name].shape) != tuple(tensor.shape)
+  ]
+  if faults:
+    raise ValueError(f"{what}: {'; '.join(faults)}")
+  module.load_state_dict(
+    {name: torch.from_numpy(np.array(state[name])) for name in own}
+  )
+
+
+def optimiser_state(optimiser: torch.optim.Optimizer) -> dict[str, Any]:
+  """An optimiser's moments: parameter index (as str) -> name -> array."""
+  state = optimiser.state_dict()["state"]
+  return {
+    str(index): {
+      name: value.detach().cpu().numpy().copy() for name, value in entry.items()
+    }
+    for index, entry in state.items()
+  }
+
+
+def load_optimiser_state(
+  optimiser: torch.optim.Optimizer, state: Mapping[str, Any]
+) -> None:
+  """Restores what `optimiser_state` returned; settings stay as built."""
+  moments = {
+    int(index): {
+      name: torch.from_numpy(np.array(value)) for name, value in entry.items()
+    }
+    for index, entry in state.items()
+  }
+  groups = optimiser.state_dict()["param_groups"]
+  optimiser.load_state_dict({"state": moments, "param_groups": groups})
+
+
+def torch_generator_state(generator: torch.Generator) -> np.ndarray:
+  """A torch generator's state, uint8 [...]."""
+  return generator.get_state().cpu().numpy().copy()
+
+
+def load_torch_generator_state(
+  generator: torch.Generator, state: np.ndarray
+) -> None:
+  """Restores what `torch_generator_state` returned."""
+  generator.set_state(torch.from_numpy(np.array(state, dtype=np.uint8)))
+
+
+def numpy_generator_state(generator: np.random.Generator) -> dict[str, Any]:
+  """A NumPy generator's state: JSON-able, with integers up to 128 bits."""
+  return dict(generator.bit_generator.state)
+
+
+def load_numpy_generator_state(
+  generator: np.random.Generator, state: Mapping[str, Any]
+) -> None:
+  """Restores what `numpy_generator_state` returned."""
+  generator.bit_generator.state = dict(state)
