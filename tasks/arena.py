@@ -1,0 +1,107 @@
+"""The room around the robot: table, light, sky and cameras."""
+
+from dm_control import composer
+
+from tasks import workspace as ws
+
+_TABLE_HALF = (0.5, 0.75)  # m
+_TABLE_TOP_HALF = 0.015  # m
+_TABLE_CENTRE_Y = 0.45  # m
+
+FRONT_CAMERA = "front"
+THREE_QUARTER_CAMERA = "three_quarter"
+
+
+class PlayArena(composer.Arena):
+  """A table under the tray; the robot's base stands at the origin."""
+
+  def _build(self, name: str = "play") -> None:
+    super()._build(name)
+    root = self.mjcf_model
+    self._set_physics(root)
+    self._set_look(root)
+    self._table = root.worldbody.add(
+      "geom",
+      name="table",
+      type="box",
+      pos=(0, _TABLE_CENTRE_Y, ws.TABLE_Z - _TABLE_TOP_HALF),
+      size=(*_TABLE_HALF, _TABLE_TOP_HALF),
+      material=root.asset.add(
+        "material", name="wood", rgba=(0.55, 0.47, 0.40, 1), specular=0.1
+      ),
+      contype=0,
+      conaffinity=0,
+    )
+    self._add_cameras(root)
+
+  @property
+  def table(self):
+    """The table's top, where a block that left the tray comes to rest."""
+    return self._table
+
+  def _set_physics(self, root) -> None:
+    # Line-search iterations below the default let blocks fly off, and
+    # pyramidal cones let a grasp slip.
+    root.option.timestep = 0.005  # s
+    root.option.gravity = (0, 0, -9.81)  # m/s^2
+    root.option.integrator = "implicitfast"
+    root.option.solver = "Newton"
+    root.option.cone = "elliptic"
+    root.option.impratio = 5
+    root.option.iterations = 100
+    root.option.ls_iterations = 50
+    root.option.tolerance = 1e-8
+
+  def _set_look(self, root) -> None:
+    root.visual.headlight.set_attributes(
+      ambient=(0.32, 0.32, 0.34), diffuse=(0.25, 0.25, 0.25), specular=(0, 0, 0)
+    )
+    root.visual.quality.shadowsize = 2048
+    root.visual.quality.offsamples = 4
+    root.visual.map.znear = 0.02
+    getattr(root.visual, "global").set_attributes(offwidth=1280, offheight=960)
+    root.asset.add(
+      "texture",
+      type="skybox",
+      builtin="gradient",
+      rgb1=(0.93, 0.95, 0.97),
+      rgb2=(0.70, 0.76, 0.84),
+      width=256,
+      height=256,
+    )
+    root.worldbody.add(
+      "light",
+      name="key",
+      pos=(0.7, 1.1, 1.6),
+      dir=(-0.45, -0.4, -1.0),
+      diffuse=(0.65, 0.64, 0.62),
+      specular=(0.2, 0.2, 0.2),
+      castshadow=True,
+      directional=False,
+    )
+    root.worldbody.add(
+      "light",
+      name="fill",
+      pos=(-0.9, 0.9, 1.2),
+      dir=(0.6, -0.3, -0.8),
+      diffuse=(0.22, 0.23, 0.26),
+      specular=(0, 0, 0),
+      castshadow=False,
+      directional=False,
+    )
+
+  def _add_cameras(self, root) -> None:
+    root.worldbody.add(
+      "camera",
+      name=FRONT_CAMERA,
+      pos=(0, 1.05, 0.52),
+      xyaxes=(-1, 0, 0, 0, -0.6, 0.8),
+      fovy=40,
+    )
+    root.worldbody.add(
+      "camera",
+      name=THREE_QUARTER_CAMERA,
+      pos=(0.62, 1.08, 0.62),
+      xyaxes=(-0.72, 0.69, 0, -0.42, -0.44, 0.79),
+      fovy=38,
+    )

@@ -1,0 +1,148 @@
+"""How actions drive the Panda: an accumulated, clipped set-point.
+
+The set-point is the activation of three integrating velocity servos that act
+on the TCP site, so accumulating, clipping to the box and servoing all happen
+inside MuJoCo at every physics step: `ctrl` is constant over a control step.
+Orientation is held pointing down by three position servos on the same site;
+gravity is compensated in the model. Gains are tuned to the released
+environment's response (see tests/tasks/control_test.py).
+"""
+
+import math
+
+import numpy as np
+from dm_control import mjcf
+
+from tasks import workspace as ws
+from tasks.entities.panda import Panda
+from tasks.entities.panda_links import FINGER_TRAVEL
+
+ACTION_SIZE = 4
+SPEED = 0.2  # m/s of the set-point at |a| = 1: 1 cm per 50 ms
+
+_POSITION_GAIN = 10_000.0  # N/m
+_POSITION_DAMPING = 950.0  # N s/m
+_POSITION_FORCE = 150.0  # N
+_ROTATION_GAIN = 400.0  # N m/rad
+_ROTATION_DAMPING = 20.0  # N m s/rad
+_ROTATION_TORQUE = 50.0  # N m
+_FINGER_GAIN = 600.0  # N/m
+_FINGER_DAMPING = 60.0  # N s/m
+_FINGER_FORCE = 10.0  # N
+_DOWN = (0.0, 1.0, 0.0, 0.0)  # pi about x: the hand points down
+
+
+class SetPointControl:
+  """Servos of one Panda; turns actions in [-1, 1]^4 into `ctrl`.
+
+  a[:3] moves the set-point along the base axes, a[3] commands the gripper:
+  < 0 opens, > 0 closes, exactly 0 keeps the last command.
+  """
+
+  def __init__(self, root: mjcf.RootElement, panda: Panda):
+    """Adds the servos to the task's root, which holds the robot."""
+    self._panda = panda
+    down = root.worldbody.add("site", name="down", quat=_DOWN, group=4)
+    actuator = root.actuator
+    self._position = []
+    self._rotation = []
+    # `down`'s y and z axes point against the base's, hence the signs.
+    signs = (1.0, -1.0, -1.0)
+    for axis, sign in enumerate(signs):
+      name = "xyz"[axis]
+      gear = np.zeros(6)
+      gear[axis] = sign
+      self._position.append(
+        actuator.add(
+          "intvelocity",
+          name=f"set_point_{name}",
+          site=panda.tcp,
+          refsite=down,
+          gear=gear,
+          kp=_POSITION_GAIN,
+          kv=_POSITION_DAMPING,
+          actrange=(ws.SET_POINT_LOW[axis], ws.SET_POINT_HIGH[axis]),
+          ctrlrange=(-SPEED, SPEED),
+          forcerange=(-_POSITION_FORCE, _POSITION_FORCE),
+        )
+      )
+      gear = np.zeros(6)
+      gear[3 + axis] = 1.0
+      self._rotation.append(
+        actuator.add(
+          "position",
+          name=f"upright_{name}",
+          site=panda.tcp,
+          refsite=down,
+          gear=gear,
+          kp=_ROTATION_GAIN,
+          kv=_ROTATION_DAMPING,
+          forcerange=(-_ROTATION_TORQUE, _ROTATION_TORQUE),
+        )
+      )
+    self._grip = [
+      actuator.add(
+        "position",
+        name=f"grip_{side}",
+        joint=joint,
+        kp=_FINGER_GAIN,
+        kv=_FINGER_DAMPING,
+        ctrlrange=(0.0, FINGER_TRAVEL),
+        forcerange=(-_FINGER_FORCE, _FINGER_FORCE),
+      )
+      for side, joint in zip(("left", "right"), panda.finger_joints, strict=True)
+    ]
+
+  def after_compile(self, physics: mjcf.Physics) -> None:
+    """Looks up where the servos' controls and set-points live."""
+    model = physics.model
+    position = physics.bind(self._position).element_id
+    self._speed_ids = np.asarray(position)
+    self._set_point_ids = np.asarray(model.actuator_actadr)[position]
+    self._grip_ids = np.asarray(physics.bind(self._grip).element_id)
+
+  def reset(self, physics: mjcf.Physics, opening: float) -> None:
+    """Puts the set-point where the TCP is and holds the fingers' opening.
+
+    Args:
+      physics: with the arm already placed and forward kinematics done.
+      opening: the fingers' opening, 0 closed to 1 open; held until the first
+        gripper command.
+    """
+    tcp = physics.bind(self._panda.tcp).xpos
+    low, high = ws.SET_POINT_LOW, ws.SET_POINT_HIGH
+    physics.data.act[self._set_point_ids] = np.clip(tcp, low, high)
+    physics.data.ctrl[:] = 0.0
+    physics.data.ctrl[self._grip_ids] = opening * FINGER_TRAVEL
+
+  def apply(self, physics: mjcf.Physics, action: np.ndarray) -> None:
+    """Sets the controls of the coming control step from a valid action."""
+    ctrl = physics.data.ctrl
+    ctrl[self._speed_ids] = SPEED * action[:3]
+    if action[3] < 0.0:
+      ctrl[self._grip_ids] = FINGER_TRAVEL
+    elif action[3] > 0.0:
+      ctrl[self._grip_ids] = 0.0
+
+  def set_point(self, physics: mjcf.Physics) -> np.ndarray:
+    """The TCP's set-point in the base frame, float [3], m."""
+    return np.array(physics.data.act[self._set_point_ids])
+
+
+def check_action(action) -> np.ndarray:
+  """Clips an action to [-1, 1].
+
+  Raises:
+    ValueError: wrong shape, or a value that is NaN.
+  """
+  action = np.asarray(action, dtype=np.float64)
+  if action.shape != (ACTION_SIZE,):
+    raise ValueError(
+      f"action has shape {action.shape}; valid is ({ACTION_SIZE},): dx, dy, "
+      "dz of the set-point and the gripper, each in [-1, 1]"
+    )
+  # A sum is NaN exactly when a term is, or when infinities cancel: both are
+  # faults, and this is the cheapest test for them.
+  if math.isnan(action.sum()):
+    raise ValueError(f"action {action} contains NaN; valid values are [-1, 1]")
+  return np.clip(action, -1.0, 1.0)

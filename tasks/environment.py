@@ -1,0 +1,183 @@
+"""The play world as a dm_env environment: Composer, made fast and seedable."""
+
+import numpy as np
+from absl import logging
+from dm_control import composer
+from dm_control.composer import observation
+from dm_control.rl import control
+import dm_env
+
+from tasks import workspace as ws
+from tasks.initialisers import Start
+from tasks.play import PlayTask
+
+
+class _OncePerStepUpdater(observation.Updater):
+  """Reads every enabled observable once a control step, without buffers.
+
+  Composer's updater keeps a schedule and a buffer for each observable, at
+  every physics step. With the plain observables of this project that is pure
+  overhead; observables with buffers, delays, aggregators or corruptors still
+  go through Composer's way.
+  """
+
+  def reset(self, physics, random_state):
+    super().reset(physics, random_state)
+    enabled = [o for o in self._observables.values() if o.enabled]
+    self._is_plain = all(_is_plain(o) for o in enabled)
+    self._readers = {
+      name: value.observation_callable(physics, random_state)
+      for name, value in self._observables.items()
+      if value.enabled
+    }
+
+  def prepare_for_next_control_step(self):
+    if not self._is_plain:
+      super().prepare_for_next_control_step()
+
+  def update(self):
+    if not self._is_plain:
+      super().update()
+
+  def get_observation(self):
+    if not self._is_plain:
+      return super().get_observation()
+    return {name: read() for name, read in self._readers.items()}
+
+
+def _is_plain(value) -> bool:
+  return (
+    value.update_interval == 1
+    and value.buffer_size in (None, 1)
+    and not value.delay
+    and value.aggregator is None
+    and value.corruptor is None
+  )
+
+
+class PlayEnvironment(composer.Environment):
+  """A `composer.Environment` with seeds, chosen starts and physics counters.
+
+  Attributes:
+    physics_failures: episodes that ended in a divergence of the simulation.
+  """
+
+  def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
+    """Wraps a task; `lfgp_dmc.load` is the way to make one."""
+    self._steps = 0
+    self._step_limit = round(time_limit / task.control_timestep)
+    self._checks = round(task.control_timestep / ws.CHECK_PERIOD)
+    self._steps_per_check = round(ws.CHECK_PERIOD / task.physics_timestep)
+    self.physics_failures = 0
+    super().__init__(
+      task,
+      time_limit=time_limit,
+      random_state=np.random.RandomState(seed),
+      raise_exception_on_physics_error=False,
+      strip_singleton_obs_buffer_dim=True,
+      max_reset_attempts=20,
+      recompile_mjcf_every_episode=False,
+    )
+
+  def _make_observation_updater(self):
+    return _OncePerStepUpdater(
+      self._task.observables,
+      physics_steps_per_control_step=1,
+      strip_singleton_buffer_dim=True,
+    )
+
+  def reset(self) -> dm_env.TimeStep:
+    """Starts an episode from the environment's random state."""
+    self._steps = 0
+    return super().reset()
+
+  def reset_to(
+    self,
+    tcp=None,
+    blue=None,
+    green=None,
+    fingers: float | None = None,
+  ) -> dm_env.TimeStep:
+    """Starts an episode in a chosen state, at rest; None is sampled.
+
+    Args:
+      tcp: [3], m, in the robot's base frame.
+      blue: [7], x y z in m and quaternion w x y z.
+      green: [7], likewise.
+      fingers: opening of both, 0 closed to 1 open; held until the first
+        gripper command.
+
+    Returns:
+      The first timestep.
+
+    Raises:
+      ValueError: a wrong shape, a value that is not finite, an opening
+        outside [0, 1], or a TCP that the arm cannot reach.
+    """
+    if fingers is not None and not 0.0 <= fingers <= 1.0:
+      raise ValueError(f"fingers={fingers!r}; valid is 0 (closed) to 1 (open)")
+    self._task.request_start(
+      Start(
+        tcp=_checked("tcp", tcp, 3),
+        blue=_checked("blue", blue, 7),
+        green=_checked("green", green, 7),
+        fingers=fingers,
+      )
+    )
+    return self.reset()
+
+  def reseed(self, seed: int) -> None:
+    """Makes the next reset, and what follows, depend on `seed` alone."""
+    self._random_state.seed(seed)
+
+  def clear_success(self) -> None:
+    """Restarts every hold and latch (play-based collection)."""
+    self._task.clear_success()
+
+  def step(self, action) -> dm_env.TimeStep:
+    """One control step: all its physics steps at once.
+
+    Success never ends an episode. The time limit gives LAST with discount 1;
+    a divergence of the simulation gives LAST with discount 0, is logged and
+    counted in `physics_failures`.
+
+    Raises:
+      ValueError: the action has a wrong shape or holds NaN.
+    """
+    if self._reset_next_step:
+      return self.reset()
+    physics, task = self._physics_proxy, self._task
+    self._hooks.before_step(physics, action, self._random_state)
+    self._observation_updater.prepare_for_next_control_step()
+    failed = False
+    try:
+      for _ in range(self._checks):
+        self._physics.step(self._steps_per_check)
+        task.check(physics)
+    except control.PhysicsError as error:
+      self.physics_failures += 1
+      failed = True
+      logging.warning("physics failure, the episode ends: %s", error)
+    self._steps += 1
+    self._hooks.after_step(physics, self._random_state)
+    self._observation_updater.update()
+    reward = 0.0 if failed else task.get_reward(physics)
+    is_last = failed or self._steps >= self._step_limit
+    self._reset_next_step = is_last
+    return dm_env.TimeStep(
+      dm_env.StepType.LAST if is_last else dm_env.StepType.MID,
+      reward,
+      0.0 if failed else 1.0,
+      self._observation_updater.get_observation(),
+    )
+
+
+def _checked(name: str, value, size: int) -> np.ndarray | None:
+  if value is None:
+    return None
+  value = np.asarray(value, dtype=np.float64)
+  if value.shape != (size,):
+    raise ValueError(f"{name} has shape {value.shape}; valid is ({size},)")
+  if not np.isfinite(value).all():
+    raise ValueError(f"{name}={value} holds values that are not finite")
+  return value

@@ -1,0 +1,28 @@
+"""The nine tasks' goals, by name."""
+
+from lfgp_dmc.task_names import ALL_TASKS
+from tasks.goals.bring import BRING, INSERT
+from tasks.goals.goal import Goal
+from tasks.goals.gripper import CLOSE_GRIPPER, OPEN_GRIPPER
+from tasks.goals.lift import LIFT
+from tasks.goals.move_object import MOVE_OBJECT
+from tasks.goals.reach import REACH
+from tasks.goals.stack import STACK, UNSTACK_STACK
+
+_ALL = (
+  STACK,
+  UNSTACK_STACK,
+  BRING,
+  INSERT,
+  OPEN_GRIPPER,
+  CLOSE_GRIPPER,
+  REACH,
+  LIFT,
+  MOVE_OBJECT,
+)
+
+GOALS: dict[str, Goal] = {goal.name: goal for goal in _ALL}
+if tuple(GOALS) != ALL_TASKS:
+  raise AssertionError(f"goals {tuple(GOALS)} are not the tasks {ALL_TASKS}")
+
+__all__ = ["GOALS", "Goal"]

@@ -1,0 +1,29 @@
+"""What makes a task: a success condition, its hold, its dense reward."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from tasks.snapshot import Snapshot
+
+Terms = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Goal:
+  """One of the nine tasks, as a condition on snapshots.
+
+  Attributes:
+    name: the task's name.
+    condition: the success condition at one instant (appendix "Evaluation" of
+      the paper; numbers of the released code).
+    dense_terms: named terms of the dense reward, whose sum is the reward.
+    is_penalised_off_tray: whether Unstack-Stack's environments add the
+      penalty for a green block that does not lie flat.
+    hold_checks: consecutive 50 ms checks before the condition is a success.
+  """
+
+  name: str
+  condition: Callable[[Snapshot], bool]
+  dense_terms: Callable[[Snapshot], Terms]
+  is_penalised_off_tray: bool = False
+  hold_checks: int = 10

@@ -1,0 +1,42 @@
+"""Move-Object: the blue block moves, smoothly, for a whole second."""
+
+from tasks import predicates
+from tasks.goals import terms
+from tasks.goals.goal import Goal, Terms
+from tasks.snapshot import Snapshot
+
+_SPEED = 0.05  # m/s
+_ACCELERATION = 5.0  # m/s^2
+_AT_BLOCK = 0.04  # m, TCP to blue
+
+
+def is_moving(state: Snapshot) -> bool:
+  """|v_b| > 5 cm/s and |a_b| < 5 m/s^2."""
+  return (
+    state.blue_speed > _SPEED and state.blue_acceleration < _ACCELERATION
+  )
+
+
+def dense_terms(state: Snapshot) -> Terms:
+  """Speed, less jerking, at the block; a bonus near it and for lifting."""
+  at_block = 1.0 if predicates.distance(state) < _AT_BLOCK else 0.0
+  is_carried = (
+    predicates.are_fingers_between(state, *terms.CLOSED_ON_BLOCK)
+    and predicates.height(state) > 0.005
+  )
+  return {
+    "speed": 5.0 * state.blue_speed * at_block,
+    "acceleration": -0.1 * min(state.blue_acceleration, 1.5) * at_block,
+    "near": terms.near_bonus(state),
+    "carry": 0.1 if is_carried else 0.0,
+    "limits": terms.limits(state),
+  }
+
+
+MOVE_OBJECT = Goal(
+  "move_object",
+  is_moving,
+  dense_terms,
+  is_penalised_off_tray=True,
+  hold_checks=20,
+)

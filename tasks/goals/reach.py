@@ -1,0 +1,24 @@
+"""Reach: the TCP is at the blue block."""
+
+from tasks import predicates
+from tasks.goals import terms
+from tasks.goals.goal import Goal, Terms
+from tasks.snapshot import Snapshot
+
+_RADIUS = 0.015  # m
+
+
+def is_reached(state: Snapshot) -> bool:
+  """|p_e - p_b| < 1.5 cm."""
+  return predicates.distance(state) < _RADIUS
+
+
+def dense_terms(state: Snapshot) -> Terms:
+  """1 - tanh(10 d), and the box's limits."""
+  return {
+    "reach": terms.closeness(0.0, state.tcp, state.blue),
+    "limits": terms.limits(state),
+  }
+
+
+REACH = Goal("reach", is_reached, dense_terms, is_penalised_off_tray=True)

@@ -1,0 +1,54 @@
+"""Stack and Unstack-Stack: blue rests on green.
+
+The two differ in how the episode starts, and in the penalty for a green block
+that does not lie flat.
+"""
+
+import math
+
+from tasks import predicates
+from tasks.goals import terms
+from tasks.goals.goal import Goal, Terms
+from tasks.snapshot import Snapshot
+
+_ABOVE_GREEN = 0.041  # m, centre to centre, of a block about to be let go
+_PLACED = 0.005  # m
+
+
+def is_stacked(state: Snapshot) -> bool:
+  """Blue touches green, and neither the tray nor the robot."""
+  return (
+    state.blue_on_green
+    and not state.blue_on_tray
+    and not state.blue_on_robot
+  )
+
+
+def dense_terms(state: Snapshot) -> Terms:
+  """The released code's terms, all zero beyond 10 cm of blue."""
+  if predicates.distance(state) > predicates.NEAR:
+    return {"place": 0.0, "retreat": 0.0, "lift": 0.0, "grasp": 0.0, "open": 0.0}
+  x, y, z = state.green
+  goal = (x, y, z + _ABOVE_GREEN)
+  high = predicates.height(state)
+  is_up = high > 0.035
+  is_held = predicates.are_fingers_between(state, *terms.CLOSED_ON_BLOCK)
+  is_placed = math.dist(state.blue, goal) < _PLACED
+  return {
+    "place": terms.closeness(_PLACED, state.blue, goal) if is_up else 0.0,
+    "retreat": (
+      terms.retreat(state) if is_up and state.blue_speed < 0.01 else 0.0
+    ),
+    # Mended: the released clip saturated at 0.007.
+    "lift": (
+      0.2 * min(high / 0.035, 1.0) if high > 0.005 and is_held else 0.0
+    ),
+    "grasp": 0.1 if terms.is_grasp_rising(state) else 0.0,
+    "open": 1.0 - state.action[3] if is_placed and high > 0.03 else 0.0,
+  }
+
+
+STACK = Goal("stack", is_stacked, dense_terms, is_penalised_off_tray=True)
+UNSTACK_STACK = Goal(
+  "unstack_stack", is_stacked, dense_terms, is_penalised_off_tray=True
+)

@@ -1,0 +1,312 @@
+"""The play task: one world, nine goals, the main one chosen by name."""
+
+import functools
+import math
+
+import numpy as np
+from dm_control import composer, mjcf
+from dm_control.composer.observation import observable
+from dm_env import specs
+
+from lfgp_dmc.observations import (
+  CONDITION_PREFIX,
+  OBSERVATION_SLICES,
+  SUCCESS_PREFIX,
+)
+from lfgp_dmc.task_names import MAIN_TASKS
+from tasks import contacts, control, initialisers, workspace as ws
+from tasks.arena import FRONT_CAMERA, PlayArena
+from tasks.entities import Block, Panda, Slot, Tray, Zone
+from tasks.features import FeatureReader
+from tasks.goals import GOALS, terms
+from tasks.holds import Holds
+
+REWARDS = ("sparse", "dense")
+OBSERVATIONS = ("features", "vision")
+REWARD_PREFIX = "reward/"
+CAMERA_OBSERVABLE = "camera/front"
+
+_PHYSICS_STEP = 0.005  # s
+_SETTLE_STEPS = 100
+_MOST_ATTEMPTS = 200
+_NO_ACTION = np.zeros(control.ACTION_SIZE)
+_TRUE, _FALSE = np.array(True), np.array(False)
+
+
+class PlayTask(composer.Task):
+  """Blocks in a tray, a Panda over it; every task's success is observed."""
+
+  def __init__(
+    self,
+    main_task: str,
+    reward: str = "sparse",
+    observations: str = "features",
+    spawn: str = "published",
+    control_hz: int = 20,
+  ):
+    """Builds the world; the arguments are those of `lfgp_dmc.load`."""
+    self.main_task = main_task
+    self._reward, self._spawn = reward, spawn
+    self._arena = PlayArena()
+    self._panda = Panda()
+    self._tray = Tray()
+    self._blue = Block(name="blue", rgba=ws.BLUE_RGBA)
+    self._green = Block(name="green", rgba=ws.GREEN_RGBA)
+    self._zones = {
+      "blue": Zone(name="blue_zone", xy=ws.BLUE_XY, rgba=ws.BLUE_RGBA),
+      "green": Zone(name="green_zone", xy=ws.GREEN_XY, rgba=ws.GREEN_RGBA),
+    }
+    for entity in (
+      self._panda,
+      self._tray,
+      *self._zones.values(),
+      Slot(name="blue_slot", xy=ws.BLUE_XY),
+      Slot(name="green_slot", xy=ws.GREEN_XY),
+    ):
+      self._arena.attach(entity)
+    self._arena.add_free_entity(self._blue)
+    self._arena.add_free_entity(self._green)
+    contacts.add_pairs(
+      self._arena, self._panda, self._blue, self._green, self._tray
+    )
+    self._control = control.SetPointControl(
+      self._arena.mjcf_model, self._panda
+    )
+    self._reader = FeatureReader(
+      self._panda, self._blue, self._green, self._tray
+    )
+    self._holds = Holds(GOALS)
+    self._requested: initialisers.Start | None = None
+    self._action = _NO_ACTION
+    self.blocks_out = 0
+    self.set_timesteps(
+      control_timestep=1.0 / control_hz, physics_timestep=_PHYSICS_STEP
+    )
+    self._task_observables = self._make_observables(observations)
+
+  # What the task is made of.
+
+  @property
+  def root_entity(self) -> PlayArena:
+    """The arena that everything is attached to."""
+    return self._arena
+
+  @property
+  def panda(self) -> Panda:
+    """The robot."""
+    return self._panda
+
+  @property
+  def blocks(self) -> tuple[Block, Block]:
+    """Blue, green."""
+    return self._blue, self._green
+
+  @property
+  def control(self) -> control.SetPointControl:
+    """The set-point control."""
+    return self._control
+
+  @property
+  def task_observables(self) -> dict:
+    """The eleven components, successes, conditions and rewards."""
+    return self._task_observables
+
+  # Observations.
+
+  def _make_observables(self, observations: str) -> dict:
+    made: dict[str, observable.Observable] = {}
+    vision = observations == "vision"
+    for name, component in OBSERVATION_SLICES.items():
+      read = functools.partial(self._read_component, component.slices)
+      made[name] = observable.Generic(read)
+      made[name].enabled = not (vision and component.privileged)
+    for index, name in enumerate(GOALS):
+      read_success = functools.partial(self._read_success, index)
+      made[SUCCESS_PREFIX + name] = observable.Generic(read_success)
+      read_condition = functools.partial(self._read_condition, index)
+      made[CONDITION_PREFIX + name] = observable.Generic(read_condition)
+      made[SUCCESS_PREFIX + name].enabled = True
+      made[CONDITION_PREFIX + name].enabled = True
+      read_reward = functools.partial(self._read_reward, name)
+      made[REWARD_PREFIX + name] = observable.Generic(read_reward)
+    camera = self._arena.mjcf_model.find("camera", FRONT_CAMERA)
+    made[CAMERA_OBSERVABLE] = observable.MJCFCamera(
+      camera, height=84, width=84, update_interval=1
+    )
+    made[CAMERA_OBSERVABLE].enabled = vision
+    return made
+
+  def _read_component(self, slices, physics) -> np.ndarray:
+    if len(slices) == 1:
+      return self._features[slices[0]]
+    return np.concatenate([self._features[part] for part in slices])
+
+  def _read_success(self, index: int, physics) -> np.ndarray:
+    return _TRUE if self._holds.successes[index] else _FALSE
+
+  def _read_condition(self, index: int, physics) -> np.ndarray:
+    return _TRUE if self._conditions[index] else _FALSE
+
+  def _read_reward(self, name: str, physics) -> np.ndarray:
+    return np.array(sum(self.reward_terms(name).values()))
+
+  # An episode.
+
+  def initialize_episode_mjcf(self, random_state) -> None:
+    """Nothing of the model changes between episodes."""
+
+  def after_compile(self, physics, random_state) -> None:
+    """Resolves addresses, with the arm at home."""
+    physics.bind(self._panda.joints).qpos = initialisers.HOME
+    physics.forward()
+    self._control.after_compile(physics)
+    self._reader.after_compile(physics)
+    self._observe(physics, moved=False)
+
+  def request_start(self, start: initialisers.Start) -> None:
+    """Makes the next reset start as asked."""
+    self._requested = start
+
+  def initialize_episode(self, physics, random_state) -> None:
+    """Samples a start until it is a fair one; see `_is_fair`.
+
+    Raises:
+      EpisodeInitializationError: no fair start in many attempts.
+    """
+    start = self._requested or initialisers.Start()
+    free = self._requested is None
+    self._requested = None
+    for _ in range(_MOST_ATTEMPTS):
+      self._place(physics, random_state, start)
+      if free:
+        for _ in range(_SETTLE_STEPS):
+          physics.step()
+      self._action = _NO_ACTION
+      physics.data.time = 0.0
+      self._begin(physics)
+      if not free or self._is_fair(physics):
+        return
+      physics.reset()
+    raise composer.EpisodeInitializationError(
+      f"no fair start of {self.main_task} in {_MOST_ATTEMPTS} attempts"
+    )
+
+  def _place(self, physics, random_state, start: initialisers.Start) -> None:
+    tcp = start.tcp
+    if tcp is None:
+      tcp = initialisers.sample_tcp(random_state, self._spawn)
+    fingers = 1.0 if start.fingers is None else start.fingers
+    on_blue = self.main_task == "unstack_stack"
+    blue, green = initialisers.sample_blocks(
+      random_state, self._spawn, on_blue, start
+    )
+    for block, pose in ((self._blue, blue), (self._green, green)):
+      block.set_pose(physics, position=pose[:3], quaternion=pose[3:])
+      block.set_velocity(physics, np.zeros(3), np.zeros(3))
+    initialisers.place_arm(physics, self._panda, tcp, fingers)
+    physics.forward()
+    self._control.reset(physics, fingers)
+
+  def _begin(self, physics) -> None:
+    physics.forward()
+    fingers = np.array(physics.bind(self._panda.finger_joints).qpos)
+    self._reader.reset_history(fingers / initialisers.FINGER_TRAVEL)
+    self._holds.clear()
+    self._is_out = [False, False]
+    self._observe(physics, moved=False)
+
+  def _is_fair(self, physics) -> bool:
+    """No main task is done, and nothing is wedged, toppled or lost."""
+    if any(self.condition(name) for name in MAIN_TASKS):
+      return False
+    if self._reader.robot_touches_block(physics):
+      return False
+    blue_z, green_z = self._snapshot.blue[2], self._snapshot.green[2]
+    if self.main_task == "unstack_stack":
+      return abs(green_z - blue_z - 2 * ws.BLOCK_HALF) < 0.001
+    return max(blue_z, green_z) < ws.FLAT_Z + 0.005
+
+  # A step.
+
+  def before_step(self, physics, action, random_state) -> None:
+    """Clips the action and hands it to the control.
+
+    Raises:
+      ValueError: the action has a wrong shape or holds NaN.
+    """
+    self._action = control.check_action(action)
+    self._control.apply(physics, self._action)
+
+  def check(self, physics) -> None:
+    """One 50 ms check of every condition."""
+    self._look(physics, moved=True)
+    self._holds.check(self._conditions)
+
+  def after_step(self, physics, random_state) -> None:
+    """Takes the 59 floats once, for every observable to slice."""
+    self._features = self._reader.features(physics)
+    self._count_blocks_out()
+    for zone, xy, block in (
+      (self._zones["blue"], ws.BLUE_XY, self._snapshot.blue),
+      (self._zones["green"], ws.GREEN_XY, self._snapshot.green),
+    ):
+      zone.light(physics, _is_in_zone(block, xy))
+
+  def _observe(self, physics, moved: bool) -> None:
+    self._look(physics, moved)
+    self._features = self._reader.features(physics)
+
+  def _look(self, physics, moved: bool) -> None:
+    self._snapshot = self._reader.snapshot(physics, self._action, moved)
+    self._conditions = [
+      goal.condition(self._snapshot) for goal in GOALS.values()
+    ]
+
+  def _count_blocks_out(self) -> None:
+    positions = (self._snapshot.blue, self._snapshot.green)
+    for index, position in enumerate(positions):
+      is_out = _is_out_of_tray(position)
+      if is_out and not self._is_out[index]:
+        self.blocks_out += 1
+      self._is_out[index] = is_out
+
+  # Success and reward.
+
+  def condition(self, name: str) -> bool:
+    """Does the condition of `name` hold at this instant."""
+    return self._conditions[list(GOALS).index(name)]
+
+  def clear_success(self) -> None:
+    """Restarts every hold and latch."""
+    self._holds.clear()
+
+  def reward_terms(self, name: str) -> dict[str, float]:
+    """The named terms of the dense reward of task `name`, at this instant."""
+    goal = GOALS[name]
+    values = goal.dense_terms(self._snapshot)
+    if self.main_task == "unstack_stack" and goal.is_penalised_off_tray:
+      values["off_tray"] = terms.off_tray_penalty(self._snapshot)
+    return values
+
+  def get_reward(self, physics) -> float:
+    """The main task's reward: sparse 1 while the condition holds, or dense."""
+    if self._reward == "dense":
+      return float(sum(self.reward_terms(self.main_task).values()))
+    return 1.0 if self.condition(self.main_task) else 0.0
+
+  def action_spec(self, physics) -> specs.BoundedArray:
+    """dx, dy, dz of the set-point and the gripper, each in [-1, 1]."""
+    return specs.BoundedArray(
+      (control.ACTION_SIZE,), np.float32, -1.0, 1.0, "action"
+    )
+
+
+def _is_in_zone(block, xy) -> bool:
+  gap = max(abs(block[0] - xy[0]), abs(block[1] - xy[1]))
+  return gap < ws.ZONE_HALF and block[2] < ws.FLAT_Z + ws.BLOCK_HALF
+
+
+def _is_out_of_tray(position) -> bool:
+  x, y, z = position
+  away = max(abs(x - ws.CENTRE_XY[0]), abs(y - ws.CENTRE_XY[1]))
+  return away > ws.TRAY_HALF or z < ws.INSERTED_Z - 0.01 or math.isnan(z)

@@ -1,0 +1,57 @@
+"""Environments by task name."""
+
+from lfgp_dmc.task_names import check_task
+from tasks.environment import PlayEnvironment
+from tasks.initialisers import SPAWNS
+from tasks.play import OBSERVATIONS, REWARDS, PlayTask
+
+CONTROL_RATES = (20, 10, 5)  # Hz: a success check falls every 50 ms
+
+
+def load(
+  task: str,
+  seed: int | None = None,
+  *,
+  reward: str = "sparse",
+  observations: str = "features",
+  spawn: str = "published",
+  control_hz: int = 20,
+  time_limit: float = 18.0,
+) -> PlayEnvironment:
+  """Makes the environment of a task.
+
+  Args:
+    task: one of the nine task names.
+    seed: of the environment's random state; None takes one from the system.
+    reward: "sparse" (1 while the task's condition holds, else 0) or "dense"
+      (the sum of the task's named terms).
+    observations: "features" (the eleven components) or "vision" (a camera,
+      84 x 84, and the components that a real robot senses).
+    spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
+    control_hz: 20, 10 or 5 control steps a second.
+    time_limit: length of an episode, s.
+
+  Returns:
+    A `composer.Environment`.
+
+  Raises:
+    ValueError: an unknown name or a value out of range, with the valid ones.
+  """
+  check_task(task)
+  _check("reward", reward, REWARDS)
+  _check("observations", observations, OBSERVATIONS)
+  _check("spawn", spawn, SPAWNS)
+  _check("control_hz", control_hz, CONTROL_RATES)
+  if not time_limit * control_hz >= 1:
+    raise ValueError(
+      f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
+    )
+  play = PlayTask(task, reward, observations, spawn, control_hz)
+  return PlayEnvironment(play, seed, time_limit)
+
+
+def _check(name: str, value, valid) -> None:
+  if value not in valid:
+    raise ValueError(
+      f"unknown {name} {value!r}; valid: {', '.join(map(str, valid))}"
+    )
