@@ -84,12 +84,12 @@ def load_policy(
     A callable from an observation, float32 [O], to an action, float32 [A].
 
   Raises:
-    ValueError: the policy has no intention of that name; lists those it has.
-    FileNotFoundError: the folder holds no policy.
+    ValueError: the folder holds no policy, or the policy has no intention of
+      that name; the message names the file, or lists the intentions.
   """
   from agents.policy import Policy
 
-  policy = Policy.load(run_folder)
+  policy = Policy.load(os.fspath(run_folder))
   task = policy.tasks[0] if task is None else task
   if task not in policy.tasks:
     raise ValueError(

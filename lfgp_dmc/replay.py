@@ -16,6 +16,7 @@ from lfgp_dmc import files
 from lfgp_dmc.types import Transition
 
 _SIDECAR = "replay.json"
+_CHUNK = 16_384  # rows of disk taken at a time
 
 
 class Replay:
@@ -60,6 +61,7 @@ class Replay:
     self._folder = None if folder is None else pathlib.Path(folder)
     self._total = 0  # rows ever added, less those withdrawn
     self._written = 0  # the most rows ever added: later ones overwrote
+    self._reserved = 0  # rows known to have disk under them
     self._mapped: list[np.memmap] = []
     columns = {name: self._column(name) for name in self._widths}
     if self._folder is not None:
@@ -96,8 +98,14 @@ class Replay:
   def add(
     self, transition: Transition, rewards: np.ndarray | None = None
   ) -> None:
-    """Appends one transition; `rewards` [K] if the replay keeps them."""
+    """Appends one transition; `rewards` [K] if the replay keeps them.
+
+    Raises:
+      OSError: the disk is full; the row is not added.
+    """
     row = self._total % self._size
+    if row >= self._reserved:
+      self._reserve(row)
     self._observation[row] = transition.observation
     self._action[row] = transition.action
     self._next_observation[row] = transition.next_observation
@@ -114,6 +122,8 @@ class Replay:
     skipped = max(0, count - self._size)  # would be overwritten at once
     numbers = np.arange(self._total + skipped, self._total + count)
     rows = numbers % self._size
+    if len(rows):
+      self._reserve(int(rows.max()))
     self._observation[rows] = transitions.observation[skipped:]
     self._action[rows] = transitions.action[skipped:]
     self._next_observation[rows] = transitions.next_observation[skipped:]
@@ -186,6 +196,17 @@ class Replay:
 
   def _rows(self, indices: np.ndarray) -> np.ndarray:
     return (np.asarray(indices) + self._start) % self._size
+
+  def _reserve(self, row: int) -> None:
+    """Takes disk up to `row`: a mapped write to a full disk would kill us."""
+    while self._reserved <= row:
+      count = min(_CHUNK, self._size - self._reserved)
+      for mapped in self._mapped:
+        width = mapped.strides[0]
+        start = mapped.offset + self._reserved * width
+        with open(str(mapped.filename), "r+b") as file:
+          os.posix_fallocate(file.fileno(), start, count * width)
+      self._reserved += count
 
   def _column(self, name: str) -> np.ndarray:
     shape = (self._size, self._widths[name])

@@ -15,6 +15,9 @@ from typing import Any
 from lfgp_dmc import files
 
 CONFIG_NAME = "config.json"
+# What the run itself adds to the config that it was started with: the policy's
+# widths and tasks, so that a run's folder is a policy folder too.
+ADDED_FIELDS = ("policy",)
 
 
 class RunFolderError(ValueError):
@@ -106,7 +109,9 @@ def resume(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
   """
   path = pathlib.Path(path)
   known = read_config(path)
-  fields = differing_fields(known, config)
+  known = {k: v for k, v in known.items() if k not in ADDED_FIELDS}
+  asked = {k: v for k, v in config.items() if k not in ADDED_FIELDS}
+  fields = differing_fields(known, asked)
   if fields:
     raise RunFolderError(
       f"{path} was started with another config; --resume keeps it. Differing: "

@@ -83,7 +83,7 @@ class PointEnvironment(dm_env.Environment):
       distance = abs(self._position[0] - side * _GOAL)
       self._done[task] |= bool(distance < _TOLERANCE)
       observation[f"success/{task}"] = np.asarray(self._done[task])
-      observation[f"reward/{task}"] = np.float32(1 - distance)
+      observation[f"reward/{task}"] = np.asarray(1 - distance, np.float32)
     return observation
 
 

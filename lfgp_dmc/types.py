@@ -72,3 +72,4 @@ class Episode(NamedTuple):
 
   observation: np.ndarray  # float32 [T, O]
   action: np.ndarray  # float32 [T, A]
+  rewards: np.ndarray | None = None  # float32 [T, K] if the replay keeps them

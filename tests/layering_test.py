@@ -1,0 +1,79 @@
+"""Imports run one way: launch -> agents and tasks -> lfgp_dmc."""
+
+import ast
+import pathlib
+import subprocess
+import sys
+
+from absl.testing import absltest, parameterized
+
+_ROOT = pathlib.Path(__file__).resolve().parents[1]
+_FACADE = pathlib.Path("lfgp_dmc/__init__.py")
+_SIMULATOR = {"mujoco", "dm_control"}
+_FORBIDDEN = {
+  "lfgp_dmc": {"tasks", "agents", "launch", "torch", *_SIMULATOR},
+  "tasks": {"agents", "launch", "torch"},
+  "agents": {"tasks", "launch", *_SIMULATOR},
+  "launch": set(),
+}
+
+
+def _roots(node: ast.AST) -> set[str]:
+  """Top-level packages that an import statement names."""
+  if isinstance(node, ast.Import):
+    return {alias.name.partition(".")[0] for alias in node.names}
+  if isinstance(node, ast.ImportFrom) and not node.level:
+    return {(node.module or "").partition(".")[0]}
+  return set()
+
+
+def _imports(source: str) -> tuple[set[str], set[str]]:
+  """What a module imports: everywhere, and inside functions only."""
+  tree = ast.parse(source)
+  functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+  lazy_nodes = {
+    inner
+    for node in ast.walk(tree)
+    if isinstance(node, functions)
+    for inner in ast.walk(node)
+  }
+  lazy, eager = set(), set()
+  for node in ast.walk(tree):
+    (lazy if node in lazy_nodes else eager).update(_roots(node))
+  return eager, lazy
+
+
+class LayeringTest(parameterized.TestCase):
+  @parameterized.parameters(*_FORBIDDEN)
+  def test_room_imports_only_downwards(self, room):
+    forbidden = _FORBIDDEN[room] | {"tests"}
+    for path in sorted((_ROOT / room).rglob("*.py")):
+      name = path.relative_to(_ROOT)
+      eager, lazy = _imports(path.read_text(encoding="utf-8"))
+      if name == _FACADE:  # may reach up, but only inside functions
+        lazy -= {"tasks", "agents"}
+      with self.subTest(str(name)):
+        self.assertEmpty((eager | lazy) & forbidden)
+
+  def test_every_import_is_seen(self):
+    eager, lazy = _imports(
+      "import a.b\nif x:\n  from c import d\nclass E:\n  def f(self):\n"
+      "    import g\n    def h():\n      from i.j import k\n"
+    )
+    self.assertEqual((eager, lazy), ({"a", "c"}, {"g", "i"}))
+
+  def test_importing_the_facade_loads_neither_simulator_nor_torch(self):
+    code = (
+      "import sys, lfgp_dmc, lfgp_dmc.loop, lfgp_dmc.evaluation\n"
+      "heavy = {'torch', 'mujoco', 'dm_control', 'tasks', 'agents'}\n"
+      "found = heavy & set(sys.modules)\n"
+      "sys.exit(str(found) if found else 0)"
+    )
+    done = subprocess.run(
+      [sys.executable, "-c", code], cwd=_ROOT, capture_output=True, text=True
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+
+
+if __name__ == "__main__":
+  absltest.main()

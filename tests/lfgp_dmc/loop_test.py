@@ -1,0 +1,167 @@
+"""The training loop on the toy world with a toy agent."""
+
+import os
+import pathlib
+import signal
+
+import numpy as np
+from absl.testing import absltest
+
+from lfgp_dmc import csv_files, loop, toy
+from lfgp_dmc.loop import Progress, TrainSchedule
+from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.replay import Replay
+
+
+class _Agent:
+  """Acts at random, learns nothing, and remembers what was asked of it."""
+
+  tasks = toy.TASKS
+
+  def __init__(self, on_act=None):
+    self.random = np.random.default_rng(0)
+    self.updates = 0
+    self.begun = 0
+    self.episodes = []
+    self.on_act = on_act
+
+  def begin_episode(self):
+    self.begun += 1
+
+  def act(self, observation):
+    assert observation.shape == (2,) and observation.dtype == np.float32
+    if self.on_act:
+      self.on_act()
+    return self.random.uniform(-0.5, 0.5, 2).astype(np.float32)
+
+  def end_episode(self, episode):
+    self.episodes.append(episode)
+
+  def update(self):
+    self.updates += 1
+
+  def metrics(self):
+    return {"loss/critic": float(self.updates)}
+
+
+class LoopTest(absltest.TestCase):
+  def setUp(self):
+    super().setUp()
+    self._folder = pathlib.Path(self.create_tempdir().full_path)
+    self._evaluated, self._saved = [], []
+
+  def _train(self, agent, environment=None, progress=None, **schedule):
+    options = {
+      "env_steps": 100,
+      "log_every": 25,
+      "evaluate_every": 50,
+      "checkpoint_every": 30,
+      "warmup_steps": 10,
+      "progress_bar": False,
+    } | schedule
+    self._replay = Replay(1000, 2, 2, reward_size=2)
+    return loop.train(
+      environment or toy.PointEnvironment(),
+      agent,
+      self._replay,
+      TrainSchedule(**options),
+      MetricsLog(self._folder),
+      lambda step: self._evaluated.append(step) or {"right": 0.5},
+      lambda at: self._saved.append((at.env_step, at.update)),
+      progress=progress,
+    )
+
+  def _rows(self):
+    return csv_files.read(self._folder / "metrics.csv")[1]
+
+  def test_everything_happens_when_due(self):
+    agent = _Agent()
+    progress = self._train(agent)
+    self.assertEqual(progress.env_step, 100)
+    self.assertEqual(progress.update, 91)  # from the tenth transition on
+    self.assertEqual((agent.begun, len(agent.episodes)), (5, 5))
+    self.assertEqual(agent.episodes[0].observation.shape, (20, 2))
+    self.assertEqual(agent.episodes[0].rewards.shape, (20, 2))
+    self.assertEqual(self._evaluated, [60, 100])  # at episode ends
+    self.assertEqual([s for s, _ in self._saved], [40, 60, 100])
+    rows = self._rows()
+    self.assertEqual(
+      [row["env_step"] for row in rows], ["25", "50", "75", "100"]
+    )
+    self.assertEqual(rows[-1]["update"], "91")
+    self.assertEqual(rows[-1]["replay_size"], "100")
+
+  def test_the_replay_holds_what_happened(self):
+    agent = _Agent()
+    self._train(agent)
+    rows = self._replay.gather(np.arange(100))
+    np.testing.assert_array_equal(
+      rows.observation[20:40], agent.episodes[1].observation
+    )
+    np.testing.assert_array_equal(
+      rows.next_observation[20:39], rows.observation[21:40]
+    )
+    distance = np.abs(rows.next_observation[:, 0] - 0.8)
+    np.testing.assert_allclose(
+      self._replay.gather_rewards(np.arange(100))[:, 0], 1 - distance, atol=1e-6
+    )
+
+  def test_a_run_ends_on_its_exact_step(self):
+    progress = self._train(_Agent(), env_steps=33, evaluate_first=True)
+    self.assertEqual(progress.env_step, 33)
+    self.assertEqual(self._evaluated, [0, 33])
+    self.assertEqual(self._saved[-1][0], 33)
+    self.assertEqual(self._rows()[-1]["env_step"], "33")
+    self.assertLen(self._replay, 33)
+
+  def test_physics_failures_are_dropped(self):
+    agent = _Agent()
+    environment = toy.PointEnvironment(fail_every=2)
+    with self.assertLogs(level="WARNING"):
+      progress = self._train(agent, environment, env_steps=60)
+    # 20 good, 10 dropped, 20 good, 10 dropped.
+    self.assertEqual((progress.episodes, progress.physics_failures), (2, 2))
+    self.assertLen(self._replay, 40)
+    self.assertLen(agent.episodes, 2)
+    kept = self._replay.gather(np.arange(40)).observation
+    np.testing.assert_array_equal(kept[20:], agent.episodes[1].observation)
+    self.assertEqual(self._rows()[-1]["physics_failures"], "2")
+
+  def test_updates_in_another_ratio(self):
+    self.assertEqual(
+      self._train(_Agent(), warmup_steps=0, updates_per_step=0.25).update, 25
+    )
+
+  def test_random_steps_draw_wide_actions(self):
+    self._train(_Agent(), random_steps=100)
+    actions = self._replay.gather(np.arange(100)).action
+    self.assertGreater(np.abs(actions).max(), 0.9)
+
+  def test_a_signal_finishes_the_episode_and_resume_goes_on(self):
+    agent = _Agent()
+    agent.on_act = lambda: (
+      os.kill(os.getpid(), signal.SIGTERM)
+      if agent.begun == 2 and agent.updates == 15
+      else None
+    )
+    agent.updates = 0
+    with self.assertLogs(level="WARNING"):
+      progress = self._train(agent, checkpoint_every=1000)
+    self.assertEqual(progress.env_step, 40)
+    self.assertEqual([step for step, _ in self._saved], [40])
+    self.assertEqual(signal.getsignal(signal.SIGTERM), signal.SIG_DFL)
+    progress = self._train(_Agent(), progress=progress, checkpoint_every=1000)
+    self.assertEqual((progress.env_step, progress.episodes), (100, 5))
+    self.assertEqual([step for step, _ in self._saved], [40, 100])
+
+  def test_a_finished_run_is_left_alone(self):
+    self._train(_Agent(), progress=Progress(env_step=100))
+    self.assertEqual((self._evaluated, self._saved), ([], []))
+
+  def test_a_bad_schedule_names_its_field(self):
+    with self.assertRaisesRegex(ValueError, "log_every is 0"):
+      TrainSchedule(env_steps=1, log_every=0)
+
+
+if __name__ == "__main__":
+  absltest.main()

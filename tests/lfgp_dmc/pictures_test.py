@@ -1,0 +1,94 @@
+"""Figures and videos are files that other programs read."""
+
+import json
+import pathlib
+
+import imageio.v2 as imageio
+import numpy as np
+from absl.testing import absltest, parameterized
+
+from lfgp_dmc import evaluation, figures, video
+from lfgp_dmc.evaluation import EvaluationRow
+
+
+def _frames(count=8, height=47, width=63):
+  frames = np.zeros((count, height, width, 3), np.uint8)
+  for i, frame in enumerate(frames):
+    frame[:, i * 5 : i * 5 + 9] = (250, 80, 20)
+  return list(frames)
+
+
+class VideoTest(parameterized.TestCase):
+  def setUp(self):
+    super().setUp()
+    self._folder = pathlib.Path(self.create_tempdir().full_path)
+
+  @parameterized.parameters("clip.mp4", "clip.gif")
+  def test_clip_plays_back(self, name):
+    path = video.write(self._folder / "new" / name, _frames(), 20, {"seed": 3})
+    read = imageio.mimread(path)
+    self.assertLen(read, 8)
+    self.assertLess(np.abs(read[4][20, 24, :3] - [250.0, 80, 20]).max(), 60)
+    sidecar = json.loads(path.with_suffix(".json").read_text())
+    self.assertEqual((sidecar["frames"], sidecar["seed"]), (8, 3))
+    self.assertLen(list(path.parent.iterdir()), 2)
+
+  def test_a_strip_of_frames(self):
+    frames = video.film_strip(_frames(), 3)
+    path = video.write(self._folder / "strip.png", frames)
+    self.assertEqual(imageio.imread(path).shape, (47, 3 * 63, 3))
+
+  def test_a_label_is_drawn_on_a_copy(self):
+    frame = np.full((240, 320, 3), 200, np.uint8)
+    labelled = video.label(frame, "reach", "step 12", highlight=True)
+    self.assertEqual(labelled.shape, frame.shape)
+    self.assertTrue((frame == 200).all())
+    self.assertTrue((labelled[60:] == 200).all())
+    self.assertGreater((labelled[:20] > 180).all(axis=-1).sum(), 50)
+
+  def test_bad_input_is_named(self):
+    frames = _frames()
+    for name, bad, message in (
+      ("a.avi", frames, "valid: .mp4, .gif, .png"),
+      ("a.mp4", [], "no frames"),
+      ("a.mp4", [frames[0] / 255.0], "float64"),
+      ("a.mp4", [frames[0], frames[0][1:]], "two sizes"),
+    ):
+      with self.assertRaisesRegex(ValueError, message):
+        video.write(self._folder / name, bad)
+    self.assertEmpty(list(self._folder.iterdir()))
+
+
+class FiguresTest(absltest.TestCase):
+  def _csv(self, seed: int) -> pathlib.Path:
+    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
+    random = np.random.default_rng(seed)
+    rows = [
+      EvaluationRow(step, task, i, seed, int(random.random() * 4 < k), None, k)
+      for k, step in enumerate((0, 10_000, 20_000))
+      for task in ("stack", "reach")
+      for i in range(5)
+    ]
+    evaluation.write_csv(path, rows)
+    return path
+
+  def test_curves_of_one_run_and_of_several(self):
+    paths = [self._csv(0), self._csv(1)]
+    for runs, quantity in ((paths[:1], "success"), (paths, "return")):
+      output = paths[0].parent / "figures" / f"{quantity}.png"
+      figures.learning_curve(runs, output, "LfGP", quantity)
+      picture = imageio.imread(output)
+      self.assertGreater(picture.shape[1], 800)
+      self.assertGreater(np.ptp(picture[..., :3]), 200)
+
+  def test_nothing_to_draw_is_an_error(self):
+    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
+    evaluation.write_csv(path, [])
+    with self.assertRaisesRegex(ValueError, "no evaluation rows"):
+      figures.learning_curve([path], path.with_suffix(".png"))
+    with self.assertRaisesRegex(ValueError, "valid: success, return"):
+      figures.learning_curve([path], path.with_suffix(".png"), "", "regret")
+
+
+if __name__ == "__main__":
+  absltest.main()
