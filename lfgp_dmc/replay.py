@@ -156,6 +156,10 @@ class Replay:
       )
     self._total = total
 
+  def clear(self) -> None:
+    """Forgets every row."""
+    self._total = self._written = 0
+
   def sample_indices(
     self, generator: np.random.Generator, count: int
   ) -> np.ndarray:

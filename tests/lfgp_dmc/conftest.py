@@ -1,4 +1,4 @@
-"""Lets absltest's temporary folders work under pytest, which parses no flags."""
+"""Lets absltest make temporary folders under pytest, which parses no flags."""
 
 from absl import flags
 

@@ -1,0 +1,81 @@
+"""A whole run stored and brought back: agent, counters, replay, CSV files.
+
+The replay reaches the disk before the checkpoint that counts its rows, so a
+kill between the two leaves a replay that is ahead, and it is rewound.
+"""
+
+import dataclasses
+
+from absl import logging
+
+from lfgp_dmc import checkpoints, csv_files
+from lfgp_dmc.loop import Progress
+from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.replay import Replay
+from lfgp_dmc.run_folder import RunFolder
+from lfgp_dmc.types import Agent
+
+
+def save(
+  run: RunFolder,
+  agent: Agent,
+  replay: Replay,
+  progress: Progress,
+  run_steps: int | None = None,
+) -> None:
+  """Writes a checkpoint at an episode's end.
+
+  Args:
+    run: the run's folder.
+    agent: gives its `state_dict`.
+    replay: flushed; a replay in memory is not stored.
+    progress: the loop's counters.
+    run_steps: length of the whole run, for which checkpoints are kept.
+
+  Raises:
+    OSError: it could not be written; earlier checkpoints are untouched.
+  """
+  replay.flush()
+  state = {
+    "agent": agent.state_dict(),
+    "progress": dataclasses.asdict(progress),
+    "replay_total": replay.total,
+  }
+  checkpoints.save(run.checkpoints, progress.env_step, state, run_steps)
+
+
+def restore(
+  run: RunFolder, agent: Agent, replay: Replay, log: MetricsLog
+) -> Progress:
+  """Goes back to the newest good checkpoint, or to the start without one.
+
+  The CSV files are cut back to it. A replay that lost the checkpoint's rows is
+  emptied, with a warning, and the loop refills it before it updates again.
+
+  Args:
+    run: the run's folder.
+    agent: freshly built; gets `load_state_dict`.
+    replay: opened from the run's folder.
+    log: the run's metrics.
+
+  Returns:
+    The progress to hand to `loop.train`.
+  """
+  path = checkpoints.latest(run.checkpoints)
+  progress, replay_total, last_step = Progress(), 0, -1
+  if path is None:
+    logging.warning("%s has no good checkpoint: starting anew", run.path)
+  else:
+    state = checkpoints.load(path)
+    agent.load_state_dict(state["agent"])
+    progress = Progress(**state["progress"])
+    replay_total, last_step = state["replay_total"], progress.env_step
+    logging.info("resuming from %s", path)
+  try:
+    replay.rewind(replay_total)
+  except ValueError as error:
+    logging.warning("%s; refilling the replay before further updates", error)
+    replay.clear()
+  log.truncate_after(last_step)
+  csv_files.truncate_after(run.evaluation, last_step)
+  return progress
