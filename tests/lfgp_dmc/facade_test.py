@@ -1,0 +1,115 @@
+"""The facade, and the names, layout and seeds that everything shares."""
+
+import sys
+import types
+from unittest import mock
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+import lfgp_dmc
+from lfgp_dmc import seeding
+
+
+class _Policy:
+  """Stands in for `agents.policy.Policy`."""
+
+  tasks = ("stack", "reach")
+
+  @classmethod
+  def load(cls, folder):
+    cls.folder = folder
+    return cls()
+
+  def begin(self, task, seed):
+    self._task = task
+
+  def act(self, observation):
+    return np.full(4, self.tasks.index(self._task), np.float32)
+
+
+class FacadeTest(parameterized.TestCase):
+  def test_every_export_is_there(self):
+    for name in lfgp_dmc.__all__:
+      self.assertTrue(hasattr(lfgp_dmc, name), name)
+
+  def test_load_passes_everything_on(self):
+    tasks = types.SimpleNamespace(load=mock.Mock(return_value="environment"))
+    with mock.patch.dict(sys.modules, {"tasks": tasks}):
+      made = lfgp_dmc.load("stack", seed=3, reward="dense")
+    self.assertEqual(made, "environment")
+    tasks.load.assert_called_once_with("stack", seed=3, reward="dense")
+
+  def test_load_policy_acts_for_the_named_task(self):
+    agents = types.SimpleNamespace(Policy=_Policy)
+    with mock.patch.dict(sys.modules, {"agents.policy": agents}):
+      main = lfgp_dmc.load_policy("runs/a")
+      reach = lfgp_dmc.load_policy("runs/a", "reach")
+      with self.assertRaisesRegex(ValueError, "'lift'; it has: stack, reach"):
+        lfgp_dmc.load_policy("runs/a", "lift")
+    observation = np.zeros(59, np.float32)
+    self.assertEqual(main(observation)[0], 0)
+    self.assertEqual(reach(observation)[0], 1)
+
+  def test_the_layout_covers_the_59_once(self):
+    slices = [
+      np.arange(59)[part]
+      for component in lfgp_dmc.OBSERVATION_SLICES.values()
+      for part in component.slices
+    ]
+    self.assertEqual(sorted(np.concatenate(slices)), list(range(59)))
+    self.assertLen(lfgp_dmc.OBSERVATION_SLICES, 11)
+
+  def test_flatten_puts_blue_before_green(self):
+    observation = {
+      name: np.full(component.size, i, np.float64)
+      for i, (name, component) in enumerate(lfgp_dmc.OBSERVATION_SLICES.items())
+    }
+    observation["block_positions"] = np.arange(6)
+    flat = lfgp_dmc.flatten(observation)
+    self.assertEqual((flat.shape, flat.dtype), ((59,), np.float32))
+    self.assertEqual(flat[12:15].tolist(), [0, 1, 2])
+    self.assertEqual(flat[19:22].tolist(), [3, 4, 5])
+    del observation["force_torque"]
+    with self.assertRaisesRegex(KeyError, "force_torque"):
+      lfgp_dmc.flatten(observation)
+
+  def test_flags_by_task(self):
+    observation = {
+      "success/stack": np.array(True),
+      "condition/stack": np.array(False),
+      "ee_position": np.zeros(3),
+    }
+    self.assertEqual(lfgp_dmc.successes(observation), {"stack": True})
+    self.assertEqual(lfgp_dmc.conditions(observation), {"stack": False})
+
+  @parameterized.parameters(*lfgp_dmc.ALL_TASKS)
+  def test_a_task_set_starts_with_its_main_task(self, task):
+    members = lfgp_dmc.task_set(task)
+    self.assertEqual(members[0], task)
+    self.assertLen(set(members), len(members))
+    self.assertContainsSubset(members, lfgp_dmc.ALL_TASKS)
+
+  def test_sizes_of_the_task_sets(self):
+    sizes = {task: len(lfgp_dmc.task_set(task)) for task in lfgp_dmc.ALL_TASKS}
+    self.assertEqual(sizes["stack"], 6)
+    self.assertEqual(sizes["insert"], 7)
+    self.assertEqual(sizes["move_object"], 5)
+    self.assertEqual(sizes["lift"], 1)
+    with self.assertRaisesRegex(ValueError, "valid tasks: stack"):
+      lfgp_dmc.task_set("juggle")
+
+
+class SeedingTest(absltest.TestCase):
+  def test_streams_depend_on_seed_and_path_alone(self):
+    paths = [(), ("a",), ("a", 1), ("a1",), ("b", 1), (1,)]
+    seeds = {seeding.derive(s, *path) for s in (0, 1) for path in paths}
+    self.assertLen(seeds, 12)
+    self.assertEqual(seeding.derive(5, "a", 1), seeding.derive(5, "a", 1))
+    self.assertEqual(
+      seeding.generator(5, "a").random(), seeding.generator(5, "a").random()
+    )
+
+
+if __name__ == "__main__":
+  absltest.main()
