@@ -27,7 +27,8 @@ def load_module_state(
     what: the module's name in error messages.
 
   Raises:
-    ValueError: names or shapes differ; the message lists each fault.
+    ValueError: names or shapes differ, or a number is not finite; the
+      message lists each fault.
   """
   own = module.state_dict()
   faults = [f"{name} is missing" for name in own if name not in state]
@@ -36,6 +37,11 @@ def load_module_state(
     f"{name} has shape {list(state[name].shape)}, not {list(tensor.shape)}"
     for name, tensor in own.items()
     if name in state and tuple(state[name].shape) != tuple(tensor.shape)
+  ]
+  faults += [
+    f"{name} holds numbers that are not finite"
+    for name in own
+    if name in state and not np.isfinite(state[name]).all()
   ]
   if faults:
     raise ValueError(f"{what}: {'; '.join(faults)}")

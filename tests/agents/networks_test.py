@@ -1,0 +1,162 @@
+"""Networks: initial bounds, stacking, the hand-written derivative."""
+
+import math
+
+import numpy as np
+import torch
+from absl.testing import absltest, parameterized
+from torch.nn import functional
+
+from agents.networks.critics import CriticNetwork, TwinCriticHeads
+from agents.networks.discriminator import Discriminator
+from agents.networks.intentions import IntentionHeads, to_deviation
+from agents.networks.linear import StackedLinear
+from agents.networks.trunk import Standardiser, Trunk
+
+K, OBS, A, H, B = 3, 7, 2, 16, 5
+
+
+def _generator():
+  return torch.Generator().manual_seed(0)
+
+
+class InitialBoundsTest(absltest.TestCase):
+  def _check(self, parameter, fan_in):
+    bound = 1 / math.sqrt(fan_in)
+    largest = parameter.abs().max().item()
+    self.assertLessEqual(largest, bound)
+    self.assertGreater(largest, 0.9 * bound)
+
+  def test_paper_sizes(self):
+    trunk = Trunk(59, 256, _generator())
+    heads = IntentionHeads(6, 256, 256, 4, _generator())
+    critics = TwinCriticHeads(6, 256, 256, 4, _generator())
+    discriminator = Discriminator(6, 59, 4, 256, _generator())
+    for parameter, fan_in in (
+      (trunk.first.weight, 59),
+      (trunk.first.bias, 59),
+      (heads.hidden.weight, 256),
+      (heads.output.weight, 256),
+      (critics.feature_weight, 260),
+      (critics.action_weight, 260),
+      (critics.bias, 260),
+      (critics.output.weight, 256),
+      (discriminator.first.weight, 63),
+      (discriminator.output.weight, 256),
+    ):
+      self._check(parameter, fan_in)
+    # Each head has the bound of its own fan-in, not of the stack's.
+    for head in heads.output.weight:
+      self._check(head, 256)
+    self.assertEqual(tuple(heads.output.weight.shape), (6, 256, 8))
+    self.assertEqual(tuple(critics.output.weight.shape), (12, 256, 1))
+
+  def test_same_generator_seed_same_network(self):
+    first, second = (Trunk(OBS, H, _generator()) for _ in range(2))
+    for one, other in zip(first.parameters(), second.parameters(), strict=True):
+      torch.testing.assert_close(one, other, rtol=0, atol=0)
+
+
+class StackingTest(absltest.TestCase):
+  def test_stack_equals_separate_layers(self):
+    layer = StackedLinear(K, OBS, H, _generator())
+    rows = torch.randn(K, B, OBS, generator=_generator())
+    expected = torch.stack(
+      [
+        functional.linear(rows[k], layer.weight[k].t(), layer.bias[k, 0])
+        for k in range(K)
+      ]
+    )
+    torch.testing.assert_close(layer(rows), expected)
+    torch.testing.assert_close(layer.one(rows[1], 1), expected[1])
+
+  def test_one_intention_equals_its_row_of_all(self):
+    heads = IntentionHeads(K, H, H, A, _generator())
+    features = torch.randn(B, H, generator=_generator())
+    mean, deviation = heads(features)
+    self.assertEqual(tuple(mean.shape), (K, B, A))
+    for task in range(K):
+      one_mean, one_raw = heads.one(features, task)
+      torch.testing.assert_close(one_mean, mean[task])
+      torch.testing.assert_close(to_deviation(one_raw), deviation[task])
+
+  def test_deviation_is_softplus_plus_epsilon(self):
+    deviation = to_deviation(torch.tensor([0.0, -100.0]))
+    self.assertAlmostEqual(deviation[0].item(), math.log(2), places=6)
+    self.assertAlmostEqual(deviation[1].item(), 1e-7, places=12)
+
+  def test_critics_see_their_own_tasks_action(self):
+    network = CriticNetwork(
+      Trunk(OBS, H, _generator()), TwinCriticHeads(K, H, H, A, _generator())
+    )
+    inputs = torch.randn(B, OBS, generator=_generator())
+    action = torch.randn(K, B, A, generator=_generator())
+    together = network(inputs, action)
+    self.assertEqual(tuple(together.shape), (2, K, B))
+    for task in range(K):
+      alone = network(inputs, action[task])
+      torch.testing.assert_close(together[:, task], alone[:, task])
+
+  def test_critic_head_equals_one_layer_over_features_and_action(self):
+    heads = TwinCriticHeads(K, H, H, A, _generator())
+    features = torch.randn(B, H, generator=_generator())
+    action = torch.randn(B, A, generator=_generator())
+    q = heads(features, action)
+    group = K + 1  # the second critic of task 1
+    weight = torch.cat(
+      [heads.feature_weight[group], heads.action_weight[group]]
+    )
+    hidden = torch.cat([features, action], -1) @ weight + heads.bias[group]
+    value = (
+      hidden.relu() @ heads.output.weight[group] + heads.output.bias[group]
+    )
+    torch.testing.assert_close(q[1, 1], value[:, 0])
+
+  def test_layer_norm_bounds_the_values(self):
+    heads = TwinCriticHeads(K, H, H, A, _generator(), layer_norm=True)
+    q = heads(torch.full((B, H), 1e6), torch.zeros(B, A))
+    bound = heads.output.weight.norm(dim=1).max() * math.sqrt(H) + 1
+    self.assertLess(q.abs().max().item(), bound.item())
+
+
+class DiscriminatorTest(parameterized.TestCase):
+  @parameterized.product(
+    inputs=("state_action", "state"), per_task=(False, True)
+  )
+  def test_hand_written_derivative_equals_autograd(self, inputs, per_task):
+    network = Discriminator(K, OBS, A, H, _generator(), inputs).double()
+    size = OBS + (A if inputs == "state_action" else 0)
+    pairs = torch.randn(
+      K, B, size, dtype=torch.float64, generator=_generator()
+    ).requires_grad_()
+    # The logits themselves are float32; take them in float64 here.
+    hidden = torch.tanh(network.second(torch.tanh(network.first(pairs))))
+    logits = network.output(hidden)
+    if per_task:
+      logits = logits.diagonal(dim1=0, dim2=2)
+    (expected,) = torch.autograd.grad(logits.sum(), pairs)
+    torch.testing.assert_close(
+      network.input_gradient(pairs, per_task), expected.float()
+    )
+
+  def test_state_input_ignores_the_action(self):
+    network = Discriminator(K, OBS, A, H, _generator(), "state")
+    state = torch.randn(B, OBS, generator=_generator())
+    joined = network.join(state, torch.ones(B, A))
+    self.assertEqual(tuple(joined.shape), (B, OBS))
+
+
+class StandardiserTest(absltest.TestCase):
+  def test_floor_on_the_deviation(self):
+    standardiser = Standardiser(2)
+    standardiser.fit(np.array([[0.0, 5.0], [4.0, 5.0]], np.float32), 0.5)
+    result = standardiser(torch.tensor([[4.0, 6.0]]))
+    torch.testing.assert_close(result, torch.tensor([[1.0, 2.0]]))
+
+  def test_starts_as_the_identity(self):
+    row = torch.tensor([[1.5, -2.0]])
+    torch.testing.assert_close(Standardiser(2)(row), row, rtol=0, atol=0)
+
+
+if __name__ == "__main__":
+  absltest.main()

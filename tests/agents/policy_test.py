@@ -1,0 +1,143 @@
+"""Stored policies: save and load, acting, faults."""
+
+import json
+import pathlib
+import tempfile
+
+import numpy as np
+import torch
+from absl.testing import absltest
+
+from agents.networks.intentions import IntentionHeads, IntentionNetwork
+from agents.networks.trunk import Standardiser, Trunk
+from agents.policy import Policy
+
+TASKS = ("main", "first")
+OBS, A, H = 5, 3, 8
+
+
+def _policy(seed=0):
+  generator = torch.Generator().manual_seed(seed)
+  standardiser = Standardiser(OBS)
+  rows = np.random.default_rng(seed).standard_normal((50, OBS))
+  standardiser.fit(rows.astype(np.float32), 0.01)
+  network = IntentionNetwork(
+    standardiser,
+    Trunk(OBS, H, generator),
+    IntentionHeads(len(TASKS), H, H, A, generator),
+    owns_trunk=True,
+  )
+  return Policy(network, TASKS)
+
+
+def _observation(*shape):
+  rows = np.random.default_rng(1).standard_normal((*shape, OBS))
+  return rows.astype(np.float32)
+
+
+class ActingTest(absltest.TestCase):
+  def test_one_row_equals_the_batch(self):
+    policy, rows = _policy(), _observation(4)
+    batch = policy.act(rows, "first")
+    self.assertEqual(batch.shape, (4, A))
+    self.assertEqual(batch.dtype, np.float32)
+    for row, action in zip(rows, batch, strict=True):
+      np.testing.assert_allclose(
+        policy.act(row, "first"), action, rtol=1e-5, atol=1e-6
+      )
+
+  def test_tasks_act_differently(self):
+    policy, row = _policy(), _observation()
+    main, first = (policy.act(row, task) for task in TASKS)
+    self.assertGreater(np.abs(main - first).max(), 1e-3)
+
+  def test_samples_follow_from_the_seed_and_surround_the_mean(self):
+    policy, row = _policy(), _observation()
+    policy.deterministic = False
+    policy.begin("main", seed=3)
+    first = [policy.act(row) for _ in range(2)]
+    policy.begin("main", seed=3)
+    second = [policy.act(row) for _ in range(2)]
+    np.testing.assert_array_equal(first, second)
+    self.assertGreater(np.abs(first[0] - first[1]).max(), 1e-4)
+    many = policy.act(
+      np.repeat(row[None], 4000, 0), generator=np.random.default_rng(0)
+    )
+    median = np.median(many, axis=0)
+    np.testing.assert_allclose(
+      median, policy.act(row, deterministic=True), atol=0.05
+    )
+
+  def test_unknown_task_is_refused_with_the_valid_ones(self):
+    policy = _policy()
+    with self.assertRaisesRegex(ValueError, "'fly'; valid: main, first"):
+      policy.begin("fly", 0)
+    with self.assertRaisesRegex(ValueError, "'fly'; valid: main, first"):
+      policy.act(_observation(), "fly")
+
+
+class FolderTest(absltest.TestCase):
+  def setUp(self):
+    super().setUp()
+    parent = self.enter_context(tempfile.TemporaryDirectory())
+    self.folder = pathlib.Path(parent) / "policy"
+
+  def test_round_trip_acts_the_same(self):
+    policy, rows = _policy(), _observation(3)
+    policy.save(self.folder, {"seed": 7})
+    loaded = Policy.load(self.folder)
+    self.assertEqual(loaded.tasks, TASKS)
+    np.testing.assert_array_equal(
+      loaded.act(rows, "first"), policy.act(rows, "first")
+    )
+    config = json.loads((self.folder / "config.json").read_text())
+    self.assertEqual(config["seed"], 7)
+
+  def test_missing_files_are_named(self):
+    _policy().save(self.folder)
+    (self.folder / "policy.safetensors").unlink()
+    with self.assertRaisesRegex(FileNotFoundError, "policy.safetensors is mis"):
+      Policy.load(self.folder)
+    with self.assertRaisesRegex(FileNotFoundError, "config.json is missing"):
+      Policy.load(self.folder.parent)
+
+  def test_damaged_arrays_are_named(self):
+    _policy().save(self.folder)
+    path = self.folder / "policy.safetensors"
+    path.write_bytes(path.read_bytes()[:-10])
+    with self.assertRaisesRegex(ValueError, "policy.safetensors: not readable"):
+      Policy.load(self.folder)
+
+  def test_damaged_config_is_named(self):
+    _policy().save(self.folder)
+    for text in ("{", "[]", "{}", '{"policy": 3}'):
+      (self.folder / "config.json").write_text(text)
+      with self.assertRaisesRegex(ValueError, "config.json"):
+        Policy.load(self.folder)
+
+  def test_arrays_that_do_not_fit_are_listed(self):
+    policy = _policy()
+    arrays, options = policy.arrays(), policy.options()
+    del arrays["trunk.first.bias"]
+    arrays["other"] = np.zeros(1, np.float32)
+    arrays["trunk.second.bias"] = np.zeros(2, np.float32)
+    arrays["trunk.first.weight"][0, 0] = np.nan
+    with self.assertRaises(ValueError) as caught:
+      Policy.from_arrays(arrays, options)
+    for fault in (
+      "trunk.first.bias is missing",
+      "other is not known",
+      "trunk.second.bias has shape [2], not [8]",
+      "trunk.first.weight holds numbers that are not finite",
+    ):
+      self.assertIn(fault, str(caught.exception))
+
+  def test_wrong_options_are_listed(self):
+    policy = _policy()
+    options = policy.options() | {"action_size": "3", "tasks": []}
+    with self.assertRaisesRegex(ValueError, "action_size is '3'.*tasks is"):
+      Policy.from_arrays(policy.arrays(), options)
+
+
+if __name__ == "__main__":
+  absltest.main()
