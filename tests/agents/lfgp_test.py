@@ -75,7 +75,12 @@ class LearningTest(absltest.TestCase):
     late = agent.metrics()
     for task in TASKS:
       self.assertGreater(late[f"accuracy_expert/{task}"], 0.9)
-      self.assertGreater(late[f"accuracy_policy/{task}"], 0.85)
+      self.assertGreater(late[f"accuracy_policy/{task}"], 0.65)
+      rise = sum(
+        late[f"accuracy_{side}/{task}"] - early[f"accuracy_{side}/{task}"]
+        for side in ("expert", "policy")
+      )
+      self.assertGreater(rise, 0.2)
       self.assertGreater(
         late[f"logit_expert/{task}"], late[f"logit_policy/{task}"]
       )
