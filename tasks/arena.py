@@ -41,10 +41,12 @@ class PlayArena(composer.Arena):
 
   def _set_physics(self, root) -> None:
     # Line-search iterations below the default let blocks fly off, and
-    # pyramidal cones let a grasp slip.
+    # pyramidal cones let a grasp slip. So do the implicit integrators (5 mm in
+    # 10 s of moves, against 1 mm): the contact forces are solved before the
+    # servos' damping is, so that hand and block part a little at each start.
     root.option.timestep = 0.005  # s
     root.option.gravity = (0, 0, -9.81)  # m/s^2
-    root.option.integrator = "implicitfast"
+    root.option.integrator = "Euler"
     root.option.solver = "Newton"
     root.option.cone = "elliptic"
     root.option.impratio = 5

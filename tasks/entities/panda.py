@@ -13,7 +13,8 @@ _WHITE = (0.93, 0.93, 0.94, 1.0)
 _DARK = (0.22, 0.23, 0.25, 1.0)
 
 _JOINT_DAMPING = 0.3  # N m s/rad
-_JOINT_ARMATURE = 0.05  # kg m^2
+# Reflected rotor inertia, kg m^2; large enough for explicit damping.
+_JOINT_ARMATURES = (0.15, 0.15, 0.15, 0.3, 0.3, 0.4, 0.3)
 _NULL_SPACE_STIFFNESS = 0.5  # N m/rad, pulls the elbow home
 _FINGER_ARMATURE = 0.2  # kg
 _FINGER_COUPLING = (0.01, 1.0)  # solref: s, damping ratio
@@ -92,17 +93,18 @@ class Panda(composer.Entity):
         fullinertia=link.inertia,
       )
       if link.joint_range is not None:
+        index = len(self._joints)
         self._joints.append(
           body.add(
             "joint",
-            name=f"joint{len(self._joints) + 1}",
+            name=f"joint{index + 1}",
             axis=(0, 0, 1),
             range=link.joint_range,
             limited=True,
             damping=_JOINT_DAMPING,
-            armature=_JOINT_ARMATURE,
+            armature=_JOINT_ARMATURES[index],
             stiffness=_NULL_SPACE_STIFFNESS,
-            springref=links.HOME[len(self._joints)],
+            springref=links.HOME[index],
           )
         )
       self._add_mesh(body, link.name, "white")
