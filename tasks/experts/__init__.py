@@ -1,0 +1,18 @@
+"""Scripted experts for the nine tasks, acting on the 59 floats alone."""
+
+from tasks.experts.expert import NOISE, POLICIES, ScriptedExpert
+
+
+def make_expert(noise: float = NOISE) -> ScriptedExpert:
+  """Makes the scripted expert; importable and picklable for workers.
+
+  Args:
+    noise: standard deviation of the Gaussian action noise.
+
+  Returns:
+    An `lfgp_dmc.types.Actor` for all nine tasks.
+  """
+  return ScriptedExpert(noise)
+
+
+__all__ = ["NOISE", "POLICIES", "ScriptedExpert", "make_expert"]

@@ -1,0 +1,105 @@
+"""Experts of Bring and Insert, functions of one observation."""
+
+import math
+
+from tasks import workspace as ws
+from tasks.experts import grasp, motion, place
+from tasks.experts.motion import CLOSE, OPEN, Command
+from tasks.experts.view import BlockView, View, across, is_held, is_on
+
+_BROUGHT = 0.020  # m, horizontally, of a block that may stay
+_DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
+_SPACING = 0.0435  # m, least distance of blocks' centres, squares parallel
+_IN_SLOT_Z = ws.INSERTED_Z + 0.0055  # m, of a block that will drop in
+_SEATED_Z = ws.INSERTED_Z + 0.002  # m
+_TILTED = math.radians(3.0)
+_JAMMED = math.radians(2.5)
+_PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
+
+
+def bring(view: View) -> Command:
+  """Sets blue down in its zone and lets go."""
+  freeing = place.free_blue(view)
+  if freeing is not None:
+    return freeing
+  blue = view.blue
+  spot = _free_spot(view.green)
+  if is_held(view, blue):
+    if spot is None:
+      return _park_blue(view)
+    error = math.hypot(blue.x - spot[0], blue.y - spot[1])
+    grip = OPEN if error < 0.008 and blue.z < ws.FLAT_Z + 0.004 else CLOSE
+    to = (*spot, ws.FLAT_Z + 0.0005)
+    return Command(place.carry(view, blue, to), grip, noise=0.8)
+  away = math.hypot(blue.x - ws.BLUE_XY[0], blue.y - ws.BLUE_XY[1])
+  if away < _BROUGHT and blue.z < ws.FLAT_Z + 0.006:
+    return place.leave(view, blue)
+  if spot is None:
+    return grasp.grasp(view, view.green)
+  return grasp.grasp(view, blue)
+
+
+def insert(view: View) -> Command:
+  """Squares blue, sets it into its slot and lets go."""
+  freeing = place.free_blue(view)
+  if freeing is not None:
+    return freeing
+  blue = view.blue
+  away = math.hypot(blue.x - ws.BLUE_XY[0], blue.y - ws.BLUE_XY[1])
+  if is_held(view, blue):
+    return _insert_held(view, away)
+  if away < 0.0025 and blue.z < _SEATED_Z:
+    return place.leave(view, blue)
+  if away < 0.0025 and blue.z < _IN_SLOT_Z + 0.001:
+    return _press(view)
+  if _is_in_the_way(view.green):
+    return grasp.grasp(view, view.green)
+  return grasp.grasp(view, blue, square=True)
+
+
+def _insert_held(view: View, away: float) -> Command:
+  blue = view.blue
+  is_askew = blue.tilt > _TILTED or abs(blue.yaw) > _JAMMED
+  if (is_askew and away > 0.004) or _is_in_the_way(view.green):
+    return _park_blue(view)
+  if away < 0.0025 and blue.z < _IN_SLOT_Z:
+    return Command(motion.stay(view), OPEN, noise=0.2)
+  to = (*ws.BLUE_XY, ws.INSERTED_Z + 0.003)
+  move = place.carry(view, blue, to, narrow=0.0006, slope=5.0, gain=0.25)
+  return Command(move, CLOSE, noise=0.2 if away < 0.006 else 0.6)
+
+
+def _park_blue(view: View) -> Command:
+  """Sets blue down flat, away from green and from the slots."""
+  y = ws.CENTRE_XY[1] + math.copysign(0.08, ws.CENTRE_XY[1] - view.green.y)
+  return place.set_down(view, view.blue, (0.0, y))
+
+
+def _press(view: View) -> Command:
+  """Presses a block that stuck half-way down, with closed fingers."""
+  blue = view.blue
+  wait = 0.05 * motion.clip((view.opening - 0.1) / 0.2, 0.0, 1.0)
+  goal = (blue.x, blue.y, blue.z + _PRESS_HEIGHT + wait)
+  move = motion.from_above(view, goal, grasp.hover_height(view))
+  return Command(move, CLOSE, noise=0.5)
+
+
+def _is_in_the_way(green: BlockView) -> bool:
+  """Does green lie on blue's slot, or where the fingers come down there."""
+  dx = abs(green.x - ws.BLUE_XY[0]) - green.half
+  dy = abs(green.y - ws.BLUE_XY[1]) - green.half
+  return (dx < 0.023 and dy < 0.023) or (dx < 0.013 and dy < 0.066)
+
+
+def _free_spot(green: BlockView) -> tuple[float, float] | None:
+  """Where in its zone blue has room beside green; None: nowhere."""
+  x, y = ws.BLUE_XY
+  dx, dy = green.x - x, green.y - y
+  # Beside it along x, out of the fingers' way: the least shift that does.
+  need = 0.020 + green.half + 0.003
+  if abs(dy) < 0.066 + green.half and abs(dx) < need:
+    shift = need - abs(dx)
+    if shift > _DODGE:
+      return None
+    return (x - math.copysign(shift, dx), y)
+  return (x, y)

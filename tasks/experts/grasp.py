@@ -1,0 +1,154 @@
+"""Getting hold of a block: room for the fingers, alignment, closing.
+
+The fingers close along y and leave a gap of 8 cm when open.
+"""
+
+import math
+
+from tasks import workspace as ws
+from tasks.experts import motion
+from tasks.experts.motion import CLOSE, OPEN, Command
+from tasks.experts.view import (
+  BlockView,
+  View,
+  across,
+  is_between_fingers,
+)
+
+GRIP_HEIGHT = 0.006  # m, TCP above the centre of a gripped block
+HOVER = 0.050  # m, TCP above the centre of the highest block on the way
+
+_FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
+_FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
+_FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
+_MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
+_SQUARE = math.radians(27)  # closing aligns a block up to about 30 degrees
+
+
+def room(
+  view: View, target: BlockView, most_y: float
+) -> tuple[float, float] | None:
+  """How far to grip beside the target's centre, so that the fingers fit.
+
+  Args:
+    view: the observation.
+    target: the block to get between the fingers.
+    most_y: largest offset along y, m.
+
+  Returns:
+    The TCP's offset from the block along x and y, m; None: the other block
+    leaves no room.
+  """
+  other = view.other(target)
+  if abs(other.z - target.z) > 0.030:
+    return (0.0, 0.0)
+  dx, dy = other.x - target.x, other.y - target.y
+  side_x, side_y = math.copysign(1.0, dx), math.copysign(1.0, dy)
+  over_x = _FINGER_HALF + other.half - abs(dx)
+  over_y = _FINGER_OUTSIDE + other.half - abs(dy)
+  if over_x <= 0 or over_y <= 0:
+    return (0.0, 0.0)
+  most_y = min(most_y, _FINGER_INSIDE - target.half - 0.003)
+  if over_y <= most_y and over_y <= over_x:
+    return (0.0, -side_y * over_y)
+  if over_x <= _MOST_X:
+    return (-side_x * over_x, 0.0)
+  if over_y <= most_y:
+    return (0.0, -side_y * over_y)
+  return None
+
+
+def hover_height(view: View) -> float:
+  """Height of the TCP from which it may cross the blocks, m."""
+  return max(view.blue.z, view.green.z) + HOVER
+
+
+def reach(
+  view: View,
+  target: BlockView,
+  height: float = GRIP_HEIGHT,
+  most_y: float = 0.010,
+) -> Command:
+  """Brings the open fingers around a block, pushing it free if need be."""
+  offset = room(view, target, most_y)
+  if is_between_fingers(view, target) and view.opening > 0.7:
+    offset = offset or (0.0, 0.0)
+  elif offset is None:
+    return push_free(view, target)
+  goal = (
+    target.x + offset[0],
+    target.y + offset[1],
+    max(target.z + height, ws.SET_POINT_LOW[2]),
+  )
+  if is_between_fingers(view, target):
+    return Command(motion.servo(view, goal), OPEN, noise=0.6)
+  # Closed fingers wait above until they are open.
+  wait = 0.05 * motion.clip((0.9 - view.opening) / 0.2, 0.0, 1.0)
+  goal = (goal[0], goal[1], goal[2] + wait)
+  return Command(motion.from_above(view, goal, hover_height(view)), OPEN)
+
+
+def grasp(view: View, target: BlockView, square: bool = False) -> Command:
+  """Reaches a block and closes the fingers on it.
+
+  Args:
+    view: the observation.
+    target: the block.
+    square: whether to turn a block parallel to the fingers first.
+  """
+  if is_between_fingers(view, target):
+    if square and abs(target.yaw) > _SQUARE and view.opening > 0.75:
+      return _turn(view, target)
+    if _is_centred(view, target):
+      goal = (
+        target.x,
+        target.y,
+        max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
+      )
+      return Command(motion.servo(view, goal, gain=0.2), CLOSE, noise=0.5)
+  return reach(view, target)
+
+
+def _is_centred(view: View, target: BlockView) -> bool:
+  """In the middle of the gap; less strictly once the fingers are closing."""
+  dx, dy, dz = across(view, target)
+  if view.opening < 0.92:
+    return True
+  offset = room(view, target, 0.010) or (0.0, 0.0)
+  return (
+    abs(dx - offset[0]) < 0.006
+    and abs(dy - offset[1]) < 0.008
+    and dz < 0.015
+  )
+
+
+def _turn(view: View, target: BlockView) -> Command:
+  """Pushes a block along y with one open finger, whose face squares it."""
+  other = view.other(target)
+  side = 1.0 if target.y < ws.CENTRE_XY[1] else -1.0
+  ahead = side * (other.y - target.y)
+  if abs(other.x - target.x) < 0.05 and 0.0 < ahead < 0.13:
+    side = -side
+  goal = (
+    target.x,
+    view.set_point[1] + side * 0.02,
+    max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
+  )
+  return Command(motion.servo(view, goal, speed=0.6), OPEN, noise=0.6)
+
+
+def push_free(view: View, target: BlockView) -> Command:
+  """Pushes a block along x with closed fingers, away from its neighbour."""
+  other = view.other(target)
+  side = 1.0 if target.x > other.x else -1.0
+  if abs(other.x) > 0.07:  # towards the middle, not up the wall
+    side = -math.copysign(1.0, other.x)
+  dx, dy, dz = across(view, target)
+  low = max(target.z + 0.004, ws.SET_POINT_LOW[2])
+  behind = -side * (target.half + 0.022)
+  if dz < 0.022 and abs(dy) < 0.012 and side * dx < -0.018:
+    goal = (view.set_point[0] + side * 0.03, target.y, low)
+    return Command(motion.servo(view, goal, speed=0.7), CLOSE, noise=0.6)
+  wait = 0.05 * motion.clip((view.opening - 0.1) / 0.2, 0.0, 1.0)
+  goal = (target.x + behind, target.y, low + wait)
+  return Command(motion.from_above(view, goal, hover_height(view)), CLOSE)

@@ -1,0 +1,103 @@
+"""How an expert moves: smooth servoing of the set-point, over obstacles."""
+
+import math
+from typing import NamedTuple
+
+from tasks.experts.view import Vector, View
+
+OPEN, CLOSE = -1, 1
+SPEED = 0.85  # |a| on a long way; 1 cm a step at 1
+
+_STEP = 0.01  # m of the set-point at |a| = 1
+_GAIN = 0.3  # share of the remaining way that a step aims to cover
+_TOP = 0.285  # m, highest set-point
+
+
+class Command(NamedTuple):
+  """What an expert wants, before noise.
+
+  Attributes:
+    move: dx, dy, dz of the action.
+    grip: OPEN or CLOSE.
+    noise: factor on the action noise: below 1 where precision is needed.
+  """
+
+  move: Vector
+  grip: int
+  noise: float = 1.0
+
+
+def clip(value: float, low: float, high: float) -> float:
+  """`value` within [low, high]."""
+  return low if value < low else high if value > high else value
+
+
+def servo(
+  view: View, goal: Vector, speed: float = SPEED, gain: float = _GAIN
+) -> Vector:
+  """Moves the set-point straight to a goal, slowing down softly.
+
+  Args:
+    view: the observation.
+    goal: of the TCP, m.
+    speed: largest |a|.
+    gain: share of the remaining way that a step covers near the goal.
+
+  Returns:
+    The action's first three values, |a| at most `speed`.
+  """
+  wanted = [
+    gain / _STEP * (to - at)
+    for to, at in zip(goal, view.set_point, strict=True)
+  ]
+  size = math.hypot(*wanted)
+  if size < 1e-9:
+    return (0.0, 0.0, 0.0)
+  scale = speed * math.tanh(size / speed) / size
+  x, y, z = wanted
+  return (scale * x, scale * y, scale * z)
+
+
+def from_above(
+  view: View,
+  goal: Vector,
+  hover: float,
+  narrow: float = 0.004,
+  slope: float = 3.0,
+  speed: float = SPEED,
+  gain: float = _GAIN,
+) -> Vector:
+  """Servoes to a goal through a funnel: high when far, down when aligned.
+
+  Args:
+    view: the observation.
+    goal: of the TCP, m.
+    hover: height of the TCP on the way, m.
+    narrow: horizontal error at which the funnel ends, m.
+    slope: metres of height for a metre of horizontal error.
+    speed: largest |a|.
+    gain: as in `servo`.
+
+  Returns:
+    The action's first three values.
+  """
+  x, y, z = goal
+  at_x, at_y, at_z = view.tcp
+  error = math.hypot(x - at_x, y - at_y)
+  rise = clip(slope * (error - narrow), 0.0, max(hover - z, 0.0))
+  height = min(z + rise, _TOP)
+  # Below the funnel: first up, then across.
+  freedom = clip((at_z - height + 0.035) / 0.02, 0.0, 1.0)
+  if error < narrow:
+    freedom = 1.0
+  to = (
+    view.set_point[0] + freedom * (x - view.set_point[0]),
+    view.set_point[1] + freedom * (y - view.set_point[1]),
+    height,
+  )
+  return servo(view, to, speed, gain)
+
+
+def stay(view: View) -> Vector:
+  """Brakes: keeps the set-point where the TCP is."""
+  return servo(view, view.tcp)

@@ -1,0 +1,61 @@
+"""What to do with a block in hand: carry it, set it down, leave it."""
+
+import math
+
+from tasks import workspace as ws
+from tasks.experts import grasp, motion
+from tasks.experts.motion import CLOSE, OPEN, Command
+from tasks.experts.view import BlockView, Vector, View, across, is_held, is_on
+
+_CARRY = 0.054  # m, a carried block's centre above the other's
+_ASIDE_X = 0.11  # m from blue, where green is set aside
+_ASIDE_Y = 0.10  # m from the middle, clear of slots and zones
+_LEAVE = 0.065  # m, TCP above a block that was let go
+
+
+def carry(
+  view: View,
+  block: BlockView,
+  spot: Vector,
+  narrow: float = 0.004,
+  slope: float = 3.0,
+  gain: float = 0.3,
+) -> Vector:
+  """Moves a held block's centre to `spot`, from above; the action's dx..dz."""
+  dx, dy, dz = across(view, block)
+  goal = (spot[0] + dx, spot[1] + dy, spot[2] + dz)
+  hover = max(view.other(block).z + _CARRY, spot[2] + 0.02) + dz
+  return motion.from_above(view, goal, hover, narrow, slope, gain=gain)
+
+
+def set_down(view: View, block: BlockView, spot: tuple[float, float]) -> Command:
+  """Carries a held block to a spot of the flat floor and lets it go."""
+  error = math.hypot(block.x - spot[0], block.y - spot[1])
+  grip = OPEN if error < 0.012 and block.z < ws.FLAT_Z + 0.006 else CLOSE
+  to = (*spot, ws.FLAT_Z + 0.001)
+  return Command(carry(view, block, to), grip, noise=0.8)
+
+
+def leave(view: View, block: BlockView) -> Command:
+  """Opens the fingers and rises from a block that is where it should be."""
+  free = motion.clip((view.opening - 0.6) / 0.3, 0.0, 1.0)
+  goal = (view.tcp[0], view.tcp[1], block.z + _LEAVE)
+  x, y, z = motion.servo(view, goal, speed=0.7)
+  return Command((x, y, free * z), OPEN, noise=0.8)
+
+
+def set_green_aside(view: View) -> Command:
+  """Puts the held green block where it is in nobody's way."""
+  blue = view.blue
+  x = blue.x - math.copysign(_ASIDE_X, blue.x)
+  y = ws.CENTRE_XY[1] + math.copysign(_ASIDE_Y, blue.y - ws.CENTRE_XY[1])
+  return set_down(view, view.green, (x, y))
+
+
+def free_blue(view: View) -> Command | None:
+  """Takes green away if it is in hand or on blue; None: nothing to do."""
+  if is_held(view, view.green) and not is_held(view, view.blue):
+    return set_green_aside(view)
+  if is_on(view.green, view.blue):
+    return grasp.grasp(view, view.green)
+  return None
