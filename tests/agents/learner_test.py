@@ -136,6 +136,9 @@ class UpdateTest(parameterized.TestCase):
     """The loss of the first update, composed anew from the networks."""
     learner = _make(discount=0.9)
     networks, batch = learner.networks, _batch()
+    with torch.no_grad():  # keeps the target apart from the online network
+      for parameter in networks.target_critics.parameters():
+        parameter.mul_(1.5)
     noise = torch.randn(
       len(TASKS), B, A, generator=torch.Generator().manual_seed(2)
     )
@@ -158,6 +161,15 @@ class UpdateTest(parameterized.TestCase):
     self.assertAlmostEqual(
       metrics["loss/critic"].item(), expected.item(), places=3
     )
+
+  def test_rewards_come_from_the_discriminator_just_updated(self):
+    learner = _make(discriminator_learning_rate=0.1)
+    batch = _batch()
+    before = learner.rewards(batch.inputs, batch.action).mean(1)
+    metrics = learner.update(batch, _batch(1), _expert())
+    after = learner.rewards(batch.inputs, batch.action).mean(1)
+    torch.testing.assert_close(metrics["reward"], after)
+    self.assertGreater((before - after).abs().max().item(), 1e-3)
 
   @parameterized.parameters(
     {},

@@ -46,6 +46,24 @@ class ActingTest(absltest.TestCase):
         policy.act(row, "first"), action, rtol=1e-5, atol=1e-6
       )
 
+  def test_mean_action_of_the_standardised_observation(self):
+    policy, row = _policy(), _observation()
+    arrays = policy.arrays()
+    inputs = (row - arrays["standardiser.mean"]) / (
+      arrays["standardiser.deviation"]
+    )
+    features = inputs
+    for layer in ("first", "second"):
+      weight, bias = (arrays[f"trunk.{layer}.{n}"] for n in ("weight", "bias"))
+      features = np.maximum(weight @ features + bias, 0)
+    hidden = features @ arrays["heads.hidden.weight"][1]
+    hidden = np.maximum(hidden + arrays["heads.hidden.bias"][1, 0], 0)
+    output = hidden @ arrays["heads.output.weight"][1]
+    output = output + arrays["heads.output.bias"][1, 0]
+    np.testing.assert_allclose(
+      policy.act(row, "first"), np.tanh(output[:A]), rtol=1e-4, atol=1e-5
+    )
+
   def test_tasks_act_differently(self):
     policy, row = _policy(), _observation()
     main, first = (policy.act(row, task) for task in TASKS)

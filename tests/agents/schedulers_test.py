@@ -171,8 +171,6 @@ class FactoryTest(parameterized.TestCase):
     name=schedulers.NAMES, main=(*task_names.MAIN_TASKS, "move_object")
   )
   def test_same_seed_same_choices_and_state_round_trip(self, name, main):
-    if (name, main) == ("weighted_random_handcrafted", "move_object"):
-      self.skipTest("the sequences need a main task beside move_object")
     first, second = _make(name, main), _make(name, main)
     self.assertEqual(_play(first), _play(second))
     arrays, tree = nested.pack(first.state_dict())
