@@ -1,5 +1,6 @@
 """The room around the robot: table, light, sky and cameras."""
 
+import numpy as np
 from dm_control import composer
 
 from tasks import workspace as ws
@@ -10,6 +11,11 @@ _TABLE_CENTRE_Y = 0.45  # m
 
 FRONT_CAMERA = "front"
 THREE_QUARTER_CAMERA = "three_quarter"
+# Name, eye, target (m), vertical field of view (degrees).
+_CAMERAS = (
+  (FRONT_CAMERA, (0.0, 1.02, 0.55), (0.0, 0.47, 0.15), 42),
+  (THREE_QUARTER_CAMERA, (0.80, 1.12, 0.66), (0.0, 0.37, 0.25), 35),
+)
 
 
 class PlayArena(composer.Arena):
@@ -27,7 +33,7 @@ class PlayArena(composer.Arena):
       pos=(0, _TABLE_CENTRE_Y, ws.TABLE_Z - _TABLE_TOP_HALF),
       size=(*_TABLE_HALF, _TABLE_TOP_HALF),
       material=root.asset.add(
-        "material", name="wood", rgba=(0.55, 0.47, 0.40, 1), specular=0.1
+        "material", name="wood", rgba=(0.50, 0.48, 0.46, 1), specular=0.05
       ),
       contype=0,
       conaffinity=0,
@@ -56,7 +62,7 @@ class PlayArena(composer.Arena):
 
   def _set_look(self, root) -> None:
     root.visual.headlight.set_attributes(
-      ambient=(0.32, 0.32, 0.34), diffuse=(0.25, 0.25, 0.25), specular=(0, 0, 0)
+      ambient=(0.36, 0.36, 0.38), diffuse=(0.25, 0.25, 0.25), specular=(0, 0, 0)
     )
     root.visual.quality.shadowsize = 2048
     root.visual.quality.offsamples = 4
@@ -74,9 +80,9 @@ class PlayArena(composer.Arena):
     root.worldbody.add(
       "light",
       name="key",
-      pos=(0.7, 1.1, 1.6),
-      dir=(-0.45, -0.4, -1.0),
-      diffuse=(0.65, 0.64, 0.62),
+      pos=(0.75, 1.75, 1.9),
+      dir=(-0.4, -0.72, -1.0),
+      diffuse=(0.6, 0.59, 0.57),
       specular=(0.2, 0.2, 0.2),
       castshadow=True,
       directional=False,
@@ -93,17 +99,17 @@ class PlayArena(composer.Arena):
     )
 
   def _add_cameras(self, root) -> None:
-    root.worldbody.add(
-      "camera",
-      name=FRONT_CAMERA,
-      pos=(0, 1.05, 0.52),
-      xyaxes=(-1, 0, 0, 0, -0.6, 0.8),
-      fovy=40,
-    )
-    root.worldbody.add(
-      "camera",
-      name=THREE_QUARTER_CAMERA,
-      pos=(0.62, 1.08, 0.62),
-      xyaxes=(-0.72, 0.69, 0, -0.42, -0.44, 0.79),
-      fovy=38,
-    )
+    for name, eye, target, fovy in _CAMERAS:
+      root.worldbody.add(
+        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
+      )
+
+
+def _look_at(eye, target) -> np.ndarray:
+  """A camera's x and y axes when it looks from `eye` at `target`, float [6]."""
+  backwards = np.subtract(eye, target)
+  right = np.cross((0.0, 0.0, 1.0), backwards)
+  up = np.cross(backwards, right)
+  return np.concatenate(
+    [right / np.linalg.norm(right), up / np.linalg.norm(up)]
+  )

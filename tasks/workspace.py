@@ -36,6 +36,6 @@ SPAWN_HALF = 0.075
 TCP_START_Z = (FLOOR_Z + 0.05, FLOOR_Z + 0.145)
 
 BLUE_RGBA = (0.13, 0.34, 0.80, 1.0)
-GREEN_RGBA = (0.18, 0.62, 0.27, 1.0)
+GREEN_RGBA = (0.20, 0.66, 0.30, 1.0)
 
 CHECK_PERIOD = 0.05  # s between two checks of a success condition

@@ -22,6 +22,8 @@ class Tray(composer.Entity):
     self._floor_geoms = [self._add_base()]
     self._floor_geoms += [self._add_floor(box) for box in _floor_boxes()]
     self._wall_geoms = [self._add_wall(index) for index in range(4)]
+    for index in range(4):
+      self._add_visual_wall(index)
 
   def _add_box(self, name, pos, size, **options):
     return self._mjcf_model.worldbody.add(
@@ -72,7 +74,45 @@ class Tray(composer.Entity):
       math.sin(half_turn) * math.cos(half_tilt),
     )
     size = (run / 2, ws.TRAY_HALF, _WALL_HALF)
-    return self._add_box(f"wall_{index}", pos, size, quat=quat)
+    return self._add_box(f"wall_{index}", pos, size, quat=quat, group=3)
+
+  def _add_visual_wall(self, index: int) -> None:
+    """A mitred prism for the eye, where the collision boxes overlap."""
+    inner, outer = ws.FLOOR_HALF, ws.TRAY_HALF
+    low = ws.FLOOR_Z - ws.SLOT_DEPTH - 2 * _BASE_HALF
+    corners = []
+    for side in (-1.0, 1.0):
+      corners += [
+        (inner, side * inner, ws.FLOOR_Z),
+        (outer, side * outer, ws.RIM_Z),
+        (outer, side * outer, low),
+        (inner, side * inner, low),
+      ]
+    turn = index * math.pi / 2
+    cos, sin = math.cos(turn), math.sin(turn)
+    centre_x, centre_y = ws.CENTRE_XY
+    mesh = self._mjcf_model.asset.add(
+      "mesh",
+      name=f"wall_{index}",
+      vertex=[
+        value
+        for x, y, z in corners
+        for value in (
+          centre_x + x * cos - y * sin,
+          centre_y + x * sin + y * cos,
+          z,
+        )
+      ],
+    )
+    self._mjcf_model.worldbody.add(
+      "geom",
+      type="mesh",
+      mesh=mesh,
+      material=self._material,
+      contype=0,
+      conaffinity=0,
+      mass=0,
+    )
 
   @property
   def mjcf_model(self) -> mjcf.RootElement:
