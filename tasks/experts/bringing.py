@@ -5,15 +5,20 @@ import math
 from tasks import workspace as ws
 from tasks.experts import grasp, motion, place
 from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import BlockView, View, across, is_held, is_on
+from tasks.experts.view import BlockView, View, across, is_held
 
 _BROUGHT = 0.020  # m, horizontally, of a block that may stay
 _DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
 _SPACING = 0.0435  # m, least distance of blocks' centres, squares parallel
-_IN_SLOT_Z = ws.INSERTED_Z + 0.0055  # m, of a block that will drop in
+_IN_MOUTH_Z = ws.INSERTED_Z + 0.0068  # m, of an upright block that will drop
+_IN_SLOT_Z = ws.INSERTED_Z + 0.0045  # m, of any block that will drop in
 _SEATED_Z = ws.INSERTED_Z + 0.002  # m
 _TILTED = math.radians(3.0)
-_JAMMED = math.radians(2.5)
+_JAMMED = math.radians(3.8)
+_TOPPLED = math.radians(7.0)
+_LEAST_GRIP = 0.002  # m, TCP over the centre of a block gripped for the slot
+_ASKEW_ON_FLOOR = math.radians(1.8)
+_ASKEW_IN_AIR = math.radians(4.0)
 _PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
 
 
@@ -50,7 +55,7 @@ def insert(view: View) -> Command:
     return _insert_held(view, away)
   if away < 0.0025 and blue.z < _SEATED_Z:
     return place.leave(view, blue)
-  if away < 0.0025 and blue.z < _IN_SLOT_Z + 0.001:
+  if away < 0.0025 and blue.z < _IN_MOUTH_Z + 0.002 and blue.tilt < _TOPPLED:
     return _press(view)
   if _is_in_the_way(view.green):
     return grasp.grasp(view, view.green)
@@ -59,14 +64,24 @@ def insert(view: View) -> Command:
 
 def _insert_held(view: View, away: float) -> Command:
   blue = view.blue
-  is_askew = blue.tilt > _TILTED or abs(blue.yaw) > _JAMMED
-  if (is_askew and away > 0.004) or _is_in_the_way(view.green):
-    return _park_blue(view)
-  if away < 0.0025 and blue.z < _IN_SLOT_Z:
+  is_in_mouth = away < 0.0015 and blue.z < _IN_MOUTH_Z
+  if is_in_mouth and (blue.tilt < _TILTED or blue.z < _IN_SLOT_Z):
     return Command(motion.stay(view), OPEN, noise=0.2)
+  if away > 0.004:
+    if blue.z < ws.FLAT_Z + 0.004 and abs(blue.yaw) > _ASKEW_ON_FLOOR:
+      return Command(motion.stay(view), OPEN)
+    is_askew = blue.tilt > _TILTED or abs(blue.yaw) > _ASKEW_IN_AIR
+    if is_askew or _is_in_the_way(view.green):
+      return _park_blue(view)
+  if blue.tilt > _TOPPLED or across(view, blue)[2] < _LEAST_GRIP:
+    return _park_blue(view)
+  if away < 0.004 and blue.tilt > _JAMMED:
+    # One edge went in, the other did not: lift until upright, try again.
+    to = (*ws.BLUE_XY, ws.FLAT_Z + 0.01)
+    return Command(place.carry(view, blue, to), CLOSE)
   to = (*ws.BLUE_XY, ws.INSERTED_Z + 0.003)
   move = place.carry(view, blue, to, narrow=0.0006, slope=5.0, gain=0.25)
-  return Command(move, CLOSE, noise=0.2 if away < 0.006 else 0.6)
+  return Command(move, CLOSE, noise=0.25 if away < 0.006 else 0.6)
 
 
 def _park_blue(view: View) -> Command:

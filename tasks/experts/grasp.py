@@ -22,7 +22,8 @@ _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
 _MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
-_SQUARE = math.radians(27)  # closing aligns a block up to about 30 degrees
+_SQUARE = math.radians(1.3)  # a block is square to the fingers
+_OPENING = 0.02  # change of the opening in a step of fingers that open
 
 
 def room(
@@ -94,10 +95,13 @@ def grasp(view: View, target: BlockView, square: bool = False) -> Command:
   Args:
     view: the observation.
     target: the block.
-    square: whether to turn a block parallel to the fingers first.
+    square: whether to turn a block parallel to the fingers first: closing
+      alone aligns it to 10 degrees, and not at all beyond 35.
   """
-  if is_between_fingers(view, target):
-    if square and abs(target.yaw) > _SQUARE and view.opening > 0.75:
+  askew = square and target.tilt < 0.1 and abs(target.yaw) > _SQUARE
+  is_letting_go = view.opening_rate > _OPENING
+  if is_between_fingers(view, target) and not is_letting_go:
+    if askew and view.opening > 0.75:
       return _turn(view, target)
     if _is_centred(view, target):
       goal = (
@@ -117,24 +121,32 @@ def _is_centred(view: View, target: BlockView) -> bool:
   offset = room(view, target, 0.010) or (0.0, 0.0)
   return (
     abs(dx - offset[0]) < 0.006
-    and abs(dy - offset[1]) < 0.008
+    and abs(dy - offset[1]) < 0.006
     and dz < 0.015
   )
 
 
 def _turn(view: View, target: BlockView) -> Command:
   """Pushes a block along y with one open finger, whose face squares it."""
-  other = view.other(target)
-  side = 1.0 if target.y < ws.CENTRE_XY[1] else -1.0
-  ahead = side * (other.y - target.y)
-  if abs(other.x - target.x) < 0.05 and 0.0 < ahead < 0.13:
-    side = -side
   goal = (
     target.x,
-    view.set_point[1] + side * 0.02,
+    view.set_point[1] + 0.02 * _turning_side(view, target),
     max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
   )
   return Command(motion.servo(view, goal, speed=0.6), OPEN, noise=0.6)
+
+
+def _turning_side(view: View, target: BlockView) -> float:
+  """Which way along y: on as begun, else to the middle, away from green."""
+  dy = view.tcp[1] - target.y
+  if abs(dy) > 0.005:
+    return math.copysign(1.0, dy)
+  other = view.other(target)
+  side = 1.0 if target.y < ws.CENTRE_XY[1] else -1.0
+  ahead = side * (other.y - target.y)
+  if abs(other.x - target.x) < 0.045 and 0.0 < ahead < 0.10:
+    return -side
+  return side
 
 
 def push_free(view: View, target: BlockView) -> Command:

@@ -43,14 +43,14 @@ class View:
     tcp: tool centre point, m.
     set_point: where the TCP is heading: the set-point, by the TCP's lag, m.
     opening: mean opening of the fingers, 0 closed to 1 open.
-    is_still: whether the fingers have stopped moving.
+    opening_rate: its change over the last step, > 0 when the fingers open.
     blue, green: the blocks.
   """
 
   tcp: Vector
   set_point: Vector
   opening: float
-  is_still: bool
+  opening_rate: float
   blue: BlockView
   green: BlockView
 
@@ -72,7 +72,7 @@ def look(observation: np.ndarray) -> View:
       o[2] + _LAG * o[5],
     ),
     opening=opening,
-    is_still=abs(opening - before) < _STILL,
+    opening_rate=opening - before,
     blue=_block(o[12:19]),
     green=_block(o[19:26]),
   )
@@ -104,7 +104,7 @@ def is_held(view: View, block: BlockView) -> bool:
   """Have the fingers stopped at the block's width."""
   low, high = _GRIP
   return (
-    view.is_still
+    abs(view.opening_rate) < _STILL
     and low < view.opening < high
     and is_between_fingers(view, block)
   )
