@@ -24,7 +24,7 @@ _PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
 
 def bring(view: View) -> Command:
   """Sets blue down in its zone and lets go."""
-  freeing = place.free_blue(view)
+  freeing = place.free_blue(view, place.CLEAR_OF_ZONES)
   if freeing is not None:
     return freeing
   blue = view.blue
@@ -46,7 +46,7 @@ def bring(view: View) -> Command:
 
 def insert(view: View) -> Command:
   """Squares blue, sets it into its slot and lets go."""
-  freeing = place.free_blue(view)
+  freeing = place.free_blue(view, place.CLEAR_OF_ZONES)
   if freeing is not None:
     return freeing
   blue = view.blue

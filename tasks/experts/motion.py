@@ -6,10 +6,10 @@ from typing import NamedTuple
 from tasks.experts.view import Vector, View
 
 OPEN, CLOSE = -1, 1
-SPEED = 0.85  # |a| on a long way; 1 cm a step at 1
+SPEED = 0.95  # |a| on a long way; 1 cm a step at 1
 
 _STEP = 0.01  # m of the set-point at |a| = 1
-_GAIN = 0.3  # share of the remaining way that a step aims to cover
+_GAIN = 0.4  # share of the remaining way that a step aims to cover
 _TOP = 0.285  # m, highest set-point
 
 
@@ -62,8 +62,8 @@ def from_above(
   view: View,
   goal: Vector,
   hover: float,
-  narrow: float = 0.004,
-  slope: float = 3.0,
+  narrow: float = 0.006,
+  slope: float = 2.5,
   speed: float = SPEED,
   gain: float = _GAIN,
 ) -> Vector:

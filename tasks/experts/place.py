@@ -8,8 +8,9 @@ from tasks.experts.motion import CLOSE, OPEN, Command
 from tasks.experts.view import BlockView, Vector, View, across, is_held, is_on
 
 _CARRY = 0.054  # m, a carried block's centre above the other's
-_ASIDE_X = 0.11  # m from blue, where green is set aside
-_ASIDE_Y = 0.10  # m from the middle, clear of slots and zones
+_ASIDE = 0.09  # m from blue along x, where green is set aside
+CLEAR_OF_SLOTS = 0.05  # m from the middle along y
+CLEAR_OF_ZONES = 0.10  # m likewise, with the fingers' room beside a zone
 _LEAVE = 0.065  # m, TCP above a block that was let go
 
 
@@ -17,9 +18,9 @@ def carry(
   view: View,
   block: BlockView,
   spot: Vector,
-  narrow: float = 0.004,
-  slope: float = 3.0,
-  gain: float = 0.3,
+  narrow: float = 0.006,
+  slope: float = 2.5,
+  gain: float = 0.4,
 ) -> Vector:
   """Moves a held block's centre to `spot`, from above; the action's dx..dz."""
   dx, dy, dz = across(view, block)
@@ -31,9 +32,9 @@ def carry(
 def set_down(view: View, block: BlockView, spot: tuple[float, float]) -> Command:
   """Carries a held block to a spot of the flat floor and lets it go."""
   error = math.hypot(block.x - spot[0], block.y - spot[1])
-  grip = OPEN if error < 0.012 and block.z < ws.FLAT_Z + 0.006 else CLOSE
+  grip = OPEN if error < 0.018 and block.z < ws.FLAT_Z + 0.006 else CLOSE
   to = (*spot, ws.FLAT_Z + 0.001)
-  return Command(carry(view, block, to), grip, noise=0.8)
+  return Command(carry(view, block, to, narrow=0.012), grip, noise=0.8)
 
 
 def leave(view: View, block: BlockView) -> Command:
@@ -44,18 +45,21 @@ def leave(view: View, block: BlockView) -> Command:
   return Command((x, y, free * z), OPEN, noise=0.8)
 
 
-def set_green_aside(view: View) -> Command:
-  """Puts the held green block where it is in nobody's way."""
+def set_green_aside(view: View, least_y: float) -> Command:
+  """Puts the held green block beside blue, at least `least_y` from y = 0.5."""
   blue = view.blue
-  x = blue.x - math.copysign(_ASIDE_X, blue.x)
-  y = ws.CENTRE_XY[1] + math.copysign(_ASIDE_Y, blue.y - ws.CENTRE_XY[1])
-  return set_down(view, view.green, (x, y))
+  dy = blue.y - ws.CENTRE_XY[1]
+  spot = (
+    blue.x - math.copysign(_ASIDE, blue.x),
+    ws.CENTRE_XY[1] + math.copysign(max(abs(dy), least_y), dy),
+  )
+  return set_down(view, view.green, spot)
 
 
-def free_blue(view: View) -> Command | None:
+def free_blue(view: View, least_y: float = CLEAR_OF_SLOTS) -> Command | None:
   """Takes green away if it is in hand or on blue; None: nothing to do."""
   if is_held(view, view.green) and not is_held(view, view.blue):
-    return set_green_aside(view)
+    return set_green_aside(view, least_y)
   if is_on(view.green, view.blue):
     return grasp.grasp(view, view.green)
   return None
