@@ -93,7 +93,9 @@ class SetPointControl:
         ctrlrange=(0.0, FINGER_TRAVEL),
         forcerange=(-_FINGER_FORCE, _FINGER_FORCE),
       )
-      for side, joint in zip(("left", "right"), panda.finger_joints, strict=True)
+      for side, joint in zip(
+        ("left", "right"), panda.finger_joints, strict=True
+      )
     ]
 
   def after_compile(self, physics: mjcf.Physics) -> None:

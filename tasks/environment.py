@@ -1,11 +1,11 @@
 """The play world as a dm_env environment: Composer, made fast and seedable."""
 
+import dm_env
 import numpy as np
 from absl import logging
 from dm_control import composer
 from dm_control.composer import observation
 from dm_control.rl import control
-import dm_env
 
 from tasks import workspace as ws
 from tasks.initialisers import Start
@@ -65,6 +65,7 @@ class PlayEnvironment(composer.Environment):
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
     """Wraps a task; `lfgp_dmc.load` is the way to make one."""
     self._steps = 0
+    self._reset_next_step: bool
     self._step_limit = round(time_limit / task.control_timestep)
     self._checks = round(task.control_timestep / ws.CHECK_PERIOD)
     self._steps_per_check = round(ws.CHECK_PERIOD / task.physics_timestep)

@@ -42,13 +42,17 @@ def _cube_rotations() -> np.ndarray:
 def _left_matrix(quat) -> np.ndarray:
   """L with L p = quat * p (Hamilton product), float [4, 4]."""
   w, x, y, z = quat
-  return np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+  return np.array(
+    [[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]
+  )
 
 
 def _right_matrix(quat) -> np.ndarray:
   """R with R p = p * quat (Hamilton product), float [4, 4]."""
   w, x, y, z = quat
-  return np.array([[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]])
+  return np.array(
+    [[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]]
+  )
 
 
 # [24, 4, 4]: applied to a quaternion, all equal-looking ones of a cube.
@@ -200,7 +204,7 @@ class FeatureReader:
     return out.astype(np.float32)
 
   def _force_torque(self, physics, sensed) -> np.ndarray:
-    """tanh of what the wrist carries beyond its own hand, float [6]."""
+    """Tanh of what the wrist carries beyond its own hand, float [6]."""
     frame = physics.data.ptr.site_xmat[self._wrist_id]
     # The sensor reads what holds the hand up: minus the weight, in its frame.
     held = self._weight * frame[6:9]

@@ -4,7 +4,7 @@ import functools
 import math
 
 import numpy as np
-from dm_control import composer, mjcf
+from dm_control import composer
 from dm_control.composer.observation import observable
 from dm_env import specs
 
@@ -14,7 +14,8 @@ from lfgp_dmc.observations import (
   SUCCESS_PREFIX,
 )
 from lfgp_dmc.task_names import MAIN_TASKS
-from tasks import contacts, control, initialisers, workspace as ws
+from tasks import contacts, control, initialisers
+from tasks import workspace as ws
 from tasks.arena import FRONT_CAMERA, PlayArena
 from tasks.entities import Block, Panda, Slot, Tray, Zone
 from tasks.features import FeatureReader
@@ -69,9 +70,7 @@ class PlayTask(composer.Task):
     contacts.add_pairs(
       self._arena, self._panda, self._blue, self._green, self._tray
     )
-    self._control = control.SetPointControl(
-      self._arena.mjcf_model, self._panda
-    )
+    self._control = control.SetPointControl(self._arena.mjcf_model, self._panda)
     self._reader = FeatureReader(
       self._panda, self._blue, self._green, self._tray
     )
@@ -100,6 +99,11 @@ class PlayTask(composer.Task):
   def blocks(self) -> tuple[Block, Block]:
     """Blue, green."""
     return self._blue, self._green
+
+  @property
+  def zones(self) -> dict[str, Zone]:
+    """The coloured zones, by their block's colour."""
+    return self._zones
 
   @property
   def control(self) -> control.SetPointControl:

@@ -1,4 +1,4 @@
-"""The world at one instant, as plain numbers that predicates and rewards read."""
+"""The world at one instant, as plain numbers for predicates and rewards."""
 
 from dataclasses import dataclass
 

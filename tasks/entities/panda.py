@@ -184,7 +184,9 @@ class Panda(composer.Entity):
 
   def _add_sites_and_sensors(self) -> None:
     site = {"type": "sphere", "size": (0.002,), "group": 4}
-    self._tcp = self._hand.add("site", name="tcp", pos=(0, 0, links.TCP_Z), **site)
+    self._tcp = self._hand.add(
+      "site", name="tcp", pos=(0, 0, links.TCP_Z), **site
+    )
     self._wrist = self._hand.add("site", name="wrist", **site)
     sensor = self._mjcf_model.sensor
     tcp = {"objtype": "site", "objname": self._tcp}

@@ -2,7 +2,8 @@
 
 import math
 
-from tasks import predicates, workspace as ws
+from tasks import predicates
+from tasks import workspace as ws
 from tasks.goals import terms
 from tasks.goals.goal import Goal, Terms
 from tasks.snapshot import Snapshot

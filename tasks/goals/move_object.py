@@ -12,9 +12,7 @@ _AT_BLOCK = 0.04  # m, TCP to blue
 
 def is_moving(state: Snapshot) -> bool:
   """|v_b| > 5 cm/s and |a_b| < 5 m/s^2."""
-  return (
-    state.blue_speed > _SPEED and state.blue_acceleration < _ACCELERATION
-  )
+  return state.blue_speed > _SPEED and state.blue_acceleration < _ACCELERATION
 
 
 def dense_terms(state: Snapshot) -> Terms:

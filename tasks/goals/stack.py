@@ -18,16 +18,20 @@ _PLACED = 0.005  # m
 def is_stacked(state: Snapshot) -> bool:
   """Blue touches green, and neither the tray nor the robot."""
   return (
-    state.blue_on_green
-    and not state.blue_on_tray
-    and not state.blue_on_robot
+    state.blue_on_green and not state.blue_on_tray and not state.blue_on_robot
   )
 
 
 def dense_terms(state: Snapshot) -> Terms:
   """The released code's terms, all zero beyond 10 cm of blue."""
   if predicates.distance(state) > predicates.NEAR:
-    return {"place": 0.0, "retreat": 0.0, "lift": 0.0, "grasp": 0.0, "open": 0.0}
+    return {
+      "place": 0.0,
+      "retreat": 0.0,
+      "lift": 0.0,
+      "grasp": 0.0,
+      "open": 0.0,
+    }
   x, y, z = state.green
   goal = (x, y, z + _ABOVE_GREEN)
   high = predicates.height(state)
@@ -40,9 +44,7 @@ def dense_terms(state: Snapshot) -> Terms:
       terms.retreat(state) if is_up and state.blue_speed < 0.01 else 0.0
     ),
     # Mended: the released clip saturated at 0.007.
-    "lift": (
-      0.2 * min(high / 0.035, 1.0) if high > 0.005 and is_held else 0.0
-    ),
+    "lift": (0.2 * min(high / 0.035, 1.0) if high > 0.005 and is_held else 0.0),
     "grasp": 0.1 if terms.is_grasp_rising(state) else 0.0,
     "open": 1.0 - state.action[3] if is_placed and high > 0.03 else 0.0,
   }

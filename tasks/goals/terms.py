@@ -2,7 +2,8 @@
 
 import math
 
-from tasks import predicates, workspace as ws
+from tasks import predicates
+from tasks import workspace as ws
 from tasks.snapshot import Snapshot
 
 CLOSED_ON_BLOCK = (0.4, 0.7)  # finger openings around a 4 cm block
