@@ -14,13 +14,12 @@ from lfgp_dmc.observations import (
   SUCCESS_PREFIX,
 )
 from lfgp_dmc.task_names import MAIN_TASKS
-from tasks import contacts, control, initialisers
+from tasks import control, initialisers
 from tasks import workspace as ws
 from tasks.arena import FRONT_CAMERA, PlayArena
-from tasks.entities import Block, Panda, Slot, Tray, Zone
-from tasks.features import FeatureReader
 from tasks.goals import GOALS, terms
 from tasks.holds import Holds
+from tasks.world import World
 
 REWARDS = ("sparse", "dense")
 OBSERVATIONS = ("features", "vision")
@@ -32,10 +31,17 @@ _SETTLE_STEPS = 100
 _MOST_ATTEMPTS = 200
 _NO_ACTION = np.zeros(control.ACTION_SIZE)
 _TRUE, _FALSE = np.array(True), np.array(False)
+_TRUE.flags.writeable = _FALSE.flags.writeable = False  # handed out as they are
 
 
 class PlayTask(composer.Task):
-  """Blocks in a tray, a Panda over it; every task's success is observed."""
+  """Blocks in a tray, a Panda over it; every task's success is observed.
+
+  Attributes:
+    main_task: the task's name.
+    world: the entities, the control and the reader.
+    blocks_out: how often a block left the tray, over all episodes.
+  """
 
   def __init__(
     self,
@@ -48,32 +54,7 @@ class PlayTask(composer.Task):
     """Builds the world; the arguments are those of `lfgp_dmc.load`."""
     self.main_task = main_task
     self._reward, self._spawn = reward, spawn
-    self._arena = PlayArena()
-    self._panda = Panda()
-    self._tray = Tray()
-    self._blue = Block(name="blue", rgba=ws.BLUE_RGBA)
-    self._green = Block(name="green", rgba=ws.GREEN_RGBA)
-    self._zones = {
-      "blue": Zone(name="blue_zone", xy=ws.BLUE_XY, rgba=ws.BLUE_RGBA),
-      "green": Zone(name="green_zone", xy=ws.GREEN_XY, rgba=ws.GREEN_RGBA),
-    }
-    for entity in (
-      self._panda,
-      self._tray,
-      *self._zones.values(),
-      Slot(name="blue_slot", xy=ws.BLUE_XY),
-      Slot(name="green_slot", xy=ws.GREEN_XY),
-    ):
-      self._arena.attach(entity)
-    self._arena.add_free_entity(self._blue)
-    self._arena.add_free_entity(self._green)
-    contacts.add_pairs(
-      self._arena, self._panda, self._blue, self._green, self._tray
-    )
-    self._control = control.SetPointControl(self._arena.mjcf_model, self._panda)
-    self._reader = FeatureReader(
-      self._panda, self._blue, self._green, self._tray
-    )
+    self.world = World()
     self._holds = Holds(GOALS)
     self._requested: initialisers.Start | None = None
     self._action = _NO_ACTION
@@ -88,27 +69,7 @@ class PlayTask(composer.Task):
   @property
   def root_entity(self) -> PlayArena:
     """The arena that everything is attached to."""
-    return self._arena
-
-  @property
-  def panda(self) -> Panda:
-    """The robot."""
-    return self._panda
-
-  @property
-  def blocks(self) -> tuple[Block, Block]:
-    """Blue, green."""
-    return self._blue, self._green
-
-  @property
-  def zones(self) -> dict[str, Zone]:
-    """The coloured zones, by their block's colour."""
-    return self._zones
-
-  @property
-  def control(self) -> control.SetPointControl:
-    """The set-point control."""
-    return self._control
+    return self.world.arena
 
   @property
   def task_observables(self) -> dict:
@@ -133,7 +94,7 @@ class PlayTask(composer.Task):
       made[CONDITION_PREFIX + name].enabled = True
       read_reward = functools.partial(self._read_reward, name)
       made[REWARD_PREFIX + name] = observable.Generic(read_reward)
-    camera = self._arena.mjcf_model.find("camera", FRONT_CAMERA)
+    camera = self.world.arena.mjcf_model.find("camera", FRONT_CAMERA)
     made[CAMERA_OBSERVABLE] = observable.MJCFCamera(
       camera, height=84, width=84, update_interval=1
     )
@@ -161,10 +122,10 @@ class PlayTask(composer.Task):
 
   def after_compile(self, physics, random_state) -> None:
     """Resolves addresses, with the arm at home."""
-    physics.bind(self._panda.joints).qpos = initialisers.HOME
+    physics.bind(self.world.panda.joints).qpos = initialisers.HOME
     physics.forward()
-    self._control.after_compile(physics)
-    self._reader.after_compile(physics)
+    self.world.control.after_compile(physics)
+    self.world.reader.after_compile(physics)
     self._observe(physics, moved=False)
 
   def request_start(self, start: initialisers.Start) -> None:
@@ -204,17 +165,17 @@ class PlayTask(composer.Task):
     blue, green = initialisers.sample_blocks(
       random_state, self._spawn, on_blue, start
     )
-    for block, pose in ((self._blue, blue), (self._green, green)):
+    for block, pose in ((self.world.blue, blue), (self.world.green, green)):
       block.set_pose(physics, position=pose[:3], quaternion=pose[3:])
       block.set_velocity(physics, np.zeros(3), np.zeros(3))
-    initialisers.place_arm(physics, self._panda, tcp, fingers)
+    initialisers.place_arm(physics, self.world.panda, tcp, fingers)
     physics.forward()
-    self._control.reset(physics, fingers)
+    self.world.control.reset(physics, fingers)
 
   def _begin(self, physics) -> None:
     physics.forward()
-    fingers = np.array(physics.bind(self._panda.finger_joints).qpos)
-    self._reader.reset_history(fingers / initialisers.FINGER_TRAVEL)
+    fingers = np.array(physics.bind(self.world.panda.finger_joints).qpos)
+    self.world.reader.reset_history(fingers / initialisers.FINGER_TRAVEL)
     self._holds.clear()
     self._is_out = [False, False]
     self._observe(physics, moved=False)
@@ -223,7 +184,7 @@ class PlayTask(composer.Task):
     """No main task is done, and nothing is wedged, toppled or lost."""
     if any(self.condition(name) for name in MAIN_TASKS):
       return False
-    if self._reader.robot_touches_block(physics):
+    if self.world.reader.robot_touches_block(physics):
       return False
     blue_z, green_z = self._snapshot.blue[2], self._snapshot.green[2]
     if self.main_task == "unstack_stack":
@@ -239,7 +200,7 @@ class PlayTask(composer.Task):
       ValueError: the action has a wrong shape or holds NaN.
     """
     self._action = control.check_action(action)
-    self._control.apply(physics, self._action)
+    self.world.control.apply(physics, self._action)
 
   def check(self, physics) -> None:
     """One 50 ms check of every condition."""
@@ -248,20 +209,20 @@ class PlayTask(composer.Task):
 
   def after_step(self, physics, random_state) -> None:
     """Takes the 59 floats once, for every observable to slice."""
-    self._features = self._reader.features(physics)
+    self._features = self.world.reader.features(physics)
     self._count_blocks_out()
     for zone, xy, block in (
-      (self._zones["blue"], ws.BLUE_XY, self._snapshot.blue),
-      (self._zones["green"], ws.GREEN_XY, self._snapshot.green),
+      (self.world.zones["blue"], ws.BLUE_XY, self._snapshot.blue),
+      (self.world.zones["green"], ws.GREEN_XY, self._snapshot.green),
     ):
       zone.light(physics, _is_in_zone(block, xy))
 
   def _observe(self, physics, moved: bool) -> None:
     self._look(physics, moved)
-    self._features = self._reader.features(physics)
+    self._features = self.world.reader.features(physics)
 
   def _look(self, physics, moved: bool) -> None:
-    self._snapshot = self._reader.snapshot(physics, self._action, moved)
+    self._snapshot = self.world.reader.snapshot(physics, self._action, moved)
     self._conditions = [
       goal.condition(self._snapshot) for goal in GOALS.values()
     ]

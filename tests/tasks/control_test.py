@@ -29,7 +29,7 @@ class ControlTest(parameterized.TestCase):
     )
 
   def tilt(self) -> float:
-    frame = self.env.physics.bind(self.env.task.panda.tcp).xmat
+    frame = self.env.physics.bind(self.env.task.world.panda.tcp).xmat
     turn = np.reshape(frame, (3, 3)) @ np.diag([1.0, -1.0, -1.0])
     return float(np.degrees(np.arccos(np.clip((turn.trace() - 1) / 2, -1, 1))))
 
@@ -51,7 +51,7 @@ class ControlTest(parameterized.TestCase):
       self.start(tcp, fingers=0.0)
       for _ in range(40):
         timestep = self.env.step(np.zeros(4))
-      set_point = self.env.task.control.set_point(self.env.physics)
+      set_point = self.env.task.world.control.set_point(self.env.physics)
       error = np.linalg.norm(set_point - timestep.observation["ee_position"])
       self.assertLess(error, 1e-3)
       self.assertLess(self.tilt(), 1.0)
@@ -59,11 +59,11 @@ class ControlTest(parameterized.TestCase):
   def test_set_point_accumulates_and_is_clipped_to_the_box(self):
     self.start((0.0, 0.5, 0.2))
     self.env.step([1.0, -0.5, 0.0, 0.0])
-    moved = self.env.task.control.set_point(self.env.physics)
+    moved = self.env.task.world.control.set_point(self.env.physics)
     np.testing.assert_allclose(moved, [0.01, 0.495, 0.2], atol=1e-4)
     for _ in range(40):
       self.env.step([1.0, 1.0, 1.0, 0.0])
-    top = self.env.task.control.set_point(self.env.physics)
+    top = self.env.task.world.control.set_point(self.env.physics)
     np.testing.assert_allclose(top, ws.SET_POINT_HIGH, atol=1e-9)
 
   def test_gripper_opens_below_0_closes_above_0_and_keeps_at_0(self):

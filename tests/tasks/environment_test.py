@@ -270,7 +270,7 @@ class EnvironmentTest(parameterized.TestCase):
 
   def test_zone_lights_up_while_its_block_is_in_it(self):
     env = lfgp_dmc.load("bring", seed=0)
-    zone = env.task.zones["blue"]
+    zone = env.task.world.zones["blue"]
     for xy, lit in (((0.075, 0.5), True), ((0.0, 0.5), False)):
       env.reset_to(
         blue=[*xy, ws.FLAT_Z, *_UPRIGHT],

@@ -1,0 +1,42 @@
+"""Everything that is in the play world, put together."""
+
+from tasks import contacts, workspace as ws
+from tasks.arena import PlayArena
+from tasks.control import SetPointControl
+from tasks.entities import Block, Panda, Slot, Tray, Zone
+from tasks.features import FeatureReader
+
+
+class World:
+  """Arena, robot, tray and blocks, with contacts, control and a reader.
+
+  Attributes:
+    arena: the root entity.
+    panda, tray, blue, green: the bodies.
+    zones: the coloured zones, by their block's colour.
+    control: turns actions into servo commands.
+    reader: turns the simulator's state into a snapshot and the 59 floats.
+  """
+
+  def __init__(self):
+    """Builds and attaches everything; nothing is compiled yet."""
+    self.arena = PlayArena()
+    self.panda = Panda()
+    self.tray = Tray()
+    self.blue = Block(name="blue", rgba=ws.BLUE_RGBA)
+    self.green = Block(name="green", rgba=ws.GREEN_RGBA)
+    self.zones = {
+      "blue": Zone(name="blue_zone", xy=ws.BLUE_XY, rgba=ws.BLUE_RGBA),
+      "green": Zone(name="green_zone", xy=ws.GREEN_XY, rgba=ws.GREEN_RGBA),
+    }
+    slots = (
+      Slot(name="blue_slot", xy=ws.BLUE_XY),
+      Slot(name="green_slot", xy=ws.GREEN_XY),
+    )
+    for entity in (self.panda, self.tray, *self.zones.values(), *slots):
+      self.arena.attach(entity)
+    self.arena.add_free_entity(self.blue)
+    self.arena.add_free_entity(self.green)
+    contacts.add_pairs(self.arena, self.panda, self.blue, self.green, self.tray)
+    self.control = SetPointControl(self.arena.mjcf_model, self.panda)
+    self.reader = FeatureReader(self.panda, self.blue, self.green, self.tray)
