@@ -7,9 +7,8 @@ from tasks.experts import grasp, motion, place
 from tasks.experts.motion import CLOSE, OPEN, Command
 from tasks.experts.view import BlockView, View, across, is_held
 
-_BROUGHT = 0.020  # m, horizontally, of a block that may stay
+_BROUGHT = 0.026  # m, horizontally, of a block that may stay
 _DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
-_SPACING = 0.0435  # m, least distance of blocks' centres, squares parallel
 _IN_MOUTH_Z = ws.INSERTED_Z + 0.0068  # m, of an upright block that will drop
 _IN_SLOT_Z = ws.INSERTED_Z + 0.0045  # m, of any block that will drop in
 _SEATED_Z = ws.INSERTED_Z + 0.002  # m
@@ -17,7 +16,7 @@ _TILTED = math.radians(3.0)
 _JAMMED = math.radians(3.8)
 _TOPPLED = math.radians(7.0)
 _LEAST_GRIP = 0.002  # m, TCP over the centre of a block gripped for the slot
-_ASKEW_ON_FLOOR = math.radians(1.8)
+_ASKEW_ON_FLOOR = math.radians(1.4)
 _ASKEW_IN_AIR = math.radians(4.0)
 _PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
 
@@ -28,14 +27,16 @@ def bring(view: View) -> Command:
   if freeing is not None:
     return freeing
   blue = view.blue
-  spot = _free_spot(view.green)
+  spot = _free_spot(view)
   if is_held(view, blue):
     if spot is None:
       return _park_blue(view)
     error = math.hypot(blue.x - spot[0], blue.y - spot[1])
-    grip = OPEN if error < 0.008 and blue.z < ws.FLAT_Z + 0.004 else CLOSE
+    is_down = blue.z < ws.FLAT_Z + (0.013 if blue.tilt > _TOPPLED else 0.004)
+    grip = OPEN if error < 0.006 and is_down else CLOSE
     to = (*spot, ws.FLAT_Z + 0.0005)
-    return Command(place.carry(view, blue, to), grip, noise=0.8)
+    move = place.carry(view, blue, to, narrow=0.003, slope=4.0)
+    return Command(move, grip, noise=0.6)
   away = math.hypot(blue.x - ws.BLUE_XY[0], blue.y - ws.BLUE_XY[1])
   if away < _BROUGHT and blue.z < ws.FLAT_Z + 0.006:
     return place.leave(view, blue)
@@ -73,12 +74,9 @@ def _insert_held(view: View, away: float) -> Command:
     is_askew = blue.tilt > _TILTED or abs(blue.yaw) > _ASKEW_IN_AIR
     if is_askew or _is_in_the_way(view.green):
       return _park_blue(view)
-  if blue.tilt > _TOPPLED or across(view, blue)[2] < _LEAST_GRIP:
+  # One edge went in and the other did not, or it is gripped too low.
+  if blue.tilt > _JAMMED or across(view, blue)[2] < _LEAST_GRIP:
     return _park_blue(view)
-  if away < 0.004 and blue.tilt > _JAMMED:
-    # One edge went in, the other did not: lift until upright, try again.
-    to = (*ws.BLUE_XY, ws.FLAT_Z + 0.01)
-    return Command(place.carry(view, blue, to), CLOSE)
   to = (*ws.BLUE_XY, ws.INSERTED_Z + 0.003)
   move = place.carry(view, blue, to, narrow=0.0006, slope=5.0, gain=0.25)
   return Command(move, CLOSE, noise=0.25 if away < 0.006 else 0.6)
@@ -106,15 +104,14 @@ def _is_in_the_way(green: BlockView) -> bool:
   return (dx < 0.023 and dy < 0.023) or (dx < 0.013 and dy < 0.066)
 
 
-def _free_spot(green: BlockView) -> tuple[float, float] | None:
+def _free_spot(view: View) -> tuple[float, float] | None:
   """Where in its zone blue has room beside green; None: nowhere."""
   x, y = ws.BLUE_XY
+  green = view.green
   dx, dy = green.x - x, green.y - y
   # Beside it along x, out of the fingers' way: the least shift that does.
-  need = 0.020 + green.half + 0.003
-  if abs(dy) < 0.066 + green.half and abs(dx) < need:
-    shift = need - abs(dx)
-    if shift > _DODGE:
-      return None
-    return (x - math.copysign(shift, dx), y)
-  return (x, y)
+  need = view.blue.half + green.half + 0.004
+  if abs(dy) > 0.066 + green.half or abs(dx) > need:
+    return (x, y)
+  shift = need - abs(dx)
+  return (x - math.copysign(shift, dx), y) if shift < _DODGE else None

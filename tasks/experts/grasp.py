@@ -22,7 +22,7 @@ _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
 _MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
-_SQUARE = math.radians(1.3)  # a block is square to the fingers
+_SQUARE = math.radians(0.9)  # a block is square to the fingers
 _OPENING = 0.02  # change of the opening in a step of fingers that open
 
 
@@ -120,9 +120,7 @@ def _is_centred(view: View, target: BlockView) -> bool:
     return True
   offset = room(view, target, 0.010) or (0.0, 0.0)
   return (
-    abs(dx - offset[0]) < 0.006
-    and abs(dy - offset[1]) < 0.006
-    and dz < 0.015
+    abs(dx - offset[0]) < 0.006 and abs(dy - offset[1]) < 0.006 and dz < 0.015
   )
 
 

@@ -29,7 +29,9 @@ def carry(
   return motion.from_above(view, goal, hover, narrow, slope, gain=gain)
 
 
-def set_down(view: View, block: BlockView, spot: tuple[float, float]) -> Command:
+def set_down(
+  view: View, block: BlockView, spot: tuple[float, float]
+) -> Command:
   """Carries a held block to a spot of the flat floor and lets it go."""
   error = math.hypot(block.x - spot[0], block.y - spot[1])
   grip = OPEN if error < 0.018 and block.z < ws.FLAT_Z + 0.006 else CLOSE
