@@ -1,6 +1,7 @@
 """Everything that is in the play world, put together."""
 
-from tasks import contacts, workspace as ws
+from tasks import contacts
+from tasks import workspace as ws
 from tasks.arena import PlayArena
 from tasks.control import SetPointControl
 from tasks.entities import Block, Panda, Slot, Tray, Zone
