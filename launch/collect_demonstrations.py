@@ -1,0 +1,141 @@
+"""Collects demonstrations: `<output>/<task>.hdf5` for each task of T_all.
+
+    python launch/collect_demonstrations.py --task=stack --output=data/stack
+"""
+
+import functools
+import os
+import pathlib
+import tempfile
+
+from absl import flags
+
+import lfgp_dmc
+from launch import actors, command
+from lfgp_dmc import collection, demonstrations
+from lfgp_dmc.collection_attempts import Plan
+from lfgp_dmc.types import Actor
+
+_TASK = flags.DEFINE_string(
+  "task", "stack", "Main task (or any of the nine): its T_all is collected."
+)
+_TASKS = flags.DEFINE_list("tasks", None, "Only these of T_all, a,b,...")
+_COLLECTION = flags.DEFINE_string(
+  "collection", "reset", "reset (before each attempt) or play (none between)."
+)
+_PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.")
+_SEED = flags.DEFINE_integer("seed", 0, "Everything random follows from it.")
+_OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
+_EXPERT = flags.DEFINE_string(
+  "expert", "scripted", "scripted, or the folder of a run or policy."
+)
+_WORKERS = flags.DEFINE_integer(
+  "workers", None, "Processes; default: one a core. The data are the same."
+)
+
+_CONTROL_HZ = 20  # what `lfgp_dmc.load` builds
+
+
+def load(task: str):
+  """Builds the environment of a task; importable by workers."""
+  return lfgp_dmc.load(task)
+
+
+def sampling_actor(make_policy) -> Actor:
+  """A stored policy that samples its actions, as the paper's experts do."""
+  policy = make_policy()
+  policy.deterministic = False
+  return policy
+
+
+def main() -> int:
+  """Collects, writes and tells what it wrote."""
+  output, tasks = _check_flags()
+  cast = actors.find("", _EXPERT.value, _TASK.value)
+  make_actor = cast.make
+  if _EXPERT.value != actors.SCRIPTED:
+    make_actor = functools.partial(sampling_actor, cast.make)
+  all_tasks = lfgp_dmc.task_set(_TASK.value)
+  lacking = [task for task in all_tasks if task not in cast.tasks]
+  if lacking:
+    raise command.UserError(
+      f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
+      f"--task={_TASK.value}; it can do: {', '.join(cast.tasks)}"
+    )
+  plan = Plan(load, make_actor, _TASK.value, all_tasks, _SEED.value)
+  try:
+    found = collection.collect(
+      plan,
+      _COLLECTION.value,
+      tasks,
+      _PAIRS.value,
+      workers=_WORKERS.value or command.cores(),
+    )
+  except collection.NoSuccessError as error:
+    raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
+  _write(output, found)
+  print(f"{demonstrations.summary_table(_data(found))}\n")
+  for task, (_, attempts, successes) in found.items():
+    print(
+      f"{task:<16}{successes} of {attempts} attempts succeeded "
+      f"({successes / attempts:.1%})"
+    )
+  print(f"wrote {output}")
+  return 0
+
+
+def _check_flags() -> tuple[pathlib.Path, list[str]]:
+  """The output folder and the tasks to collect."""
+  command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
+  command.check_choice(
+    "collection", _COLLECTION.value, collection.COLLECTIONS
+  )
+  command.check_least("pairs_per_task", _PAIRS.value, 1)
+  command.check_least("seed", _SEED.value, 0)
+  if _WORKERS.value is not None:
+    command.check_least("workers", _WORKERS.value, 1)
+  valid = lfgp_dmc.task_set(_TASK.value)
+  tasks = list(dict.fromkeys(_TASKS.value or valid))
+  for task in tasks:
+    command.check_choice("tasks", task, valid)
+  if not _OUTPUT.value:
+    raise command.UserError("--output is not set: give a new folder's name")
+  output = pathlib.Path(_OUTPUT.value)
+  if output.exists():
+    raise command.UserError(
+      f"--output={output} exists; valid: a new folder (datasets are never "
+      "written into)"
+    )
+  return output, tasks
+
+
+def _data(found: dict[str, collection.Collected]):
+  return {task: part.demonstrations for task, part in found.items()}
+
+
+def _write(
+  output: pathlib.Path, found: dict[str, collection.Collected]
+) -> None:
+  """Writes the dataset aside, then gives it its name: whole or not at all."""
+  output.parent.mkdir(parents=True, exist_ok=True)
+  prefix = f".{output.name}.partial."
+  with tempfile.TemporaryDirectory(prefix=prefix, dir=output.parent) as aside:
+    folder = demonstrations.create_folder(pathlib.Path(aside) / output.name)
+    for task, data in _data(found).items():
+      attributes = {
+        "task": task,
+        "main_task": _TASK.value,
+        "collection": _COLLECTION.value,
+        "expert": _EXPERT.value,
+        "seed": _SEED.value,
+        "control_hz": _CONTROL_HZ,
+      }
+      path = folder / (task + demonstrations.SUFFIX)
+      demonstrations.write(path, data, attributes)
+    if output.exists():
+      raise command.UserError(f"--output={output} appeared meanwhile")
+    os.rename(folder, output)
+
+
+if __name__ == "__main__":
+  command.run(main)

@@ -1,0 +1,108 @@
+"""Work shared among processes, with results in the order of the jobs.
+
+Each process builds its own state once (an environment, an actor). Jobs may be
+endless: a few are in flight, and closing the iterator ends the processes.
+"""
+
+import collections
+import concurrent.futures
+import contextlib
+import itertools
+import multiprocessing
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+# What a worker must find set before it imports anything.
+_VARIABLES = {
+  "OMP_NUM_THREADS": "1",
+  "MKL_NUM_THREADS": "1",
+  "OPENBLAS_NUM_THREADS": "1",
+  "OMP_WAIT_POLICY": "PASSIVE",
+  "MUJOCO_GL": "off",
+}
+
+
+def ordered(
+  make_state: Callable[[], Callable[[Any], Any]],
+  jobs: Iterable[Any],
+  workers: int,
+) -> Iterator[Any]:
+  """Yields the result of each job, in order.
+
+  Args:
+    make_state: called once in each process; returns what does a job. With
+      several workers it must be picklable, and so must jobs and results.
+    jobs: finite or endless.
+    workers: processes; 1 works in this one.
+
+  Yields:
+    `make_state()(job)` for each job.
+  """
+  if workers == 1:
+    yield from map(make_state(), jobs)
+    return
+  jobs = iter(jobs)
+  with _variables():
+    pool = concurrent.futures.ProcessPoolExecutor(
+      workers,
+      mp_context=multiprocessing.get_context("spawn"),
+      initializer=_start,
+      initargs=(make_state,),
+    )
+    try:
+      flying = collections.deque(
+        pool.submit(_work, job) for job in itertools.islice(jobs, 2 * workers)
+      )
+      while flying:
+        result = flying.popleft().result()
+        flying.extend(
+          pool.submit(_work, job) for job in itertools.islice(jobs, 1)
+        )
+        yield result
+    finally:
+      pool.shutdown(cancel_futures=True)
+
+
+_state: Callable[[Any], Any] | None = None  # one in each worker process
+
+
+def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
+  global _state
+  signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
+  threading.Thread(target=_end_with_parent, daemon=True).start()
+  _state = make_state()
+
+
+def _work(job: Any) -> Any:
+  assert _state is not None
+  return _state(job)
+
+
+def _end_with_parent() -> None:
+  """Ends this worker when its parent is gone, however that was killed."""
+  parent = multiprocessing.parent_process()
+  assert parent is not None
+  parent.join()
+  os._exit(1)
+
+
+@contextlib.contextmanager
+def _variables() -> Iterator[None]:
+  """Sets the variables that spawned processes inherit, then restores ours.
+
+  They must be there before a worker's first import, which an initializer
+  would come too late for: unpickling its arguments already imports.
+  """
+  before = {name: os.environ.get(name) for name in _VARIABLES}
+  os.environ.update(_VARIABLES)
+  try:
+    yield
+  finally:
+    for name, value in before.items():
+      if value is None:
+        del os.environ[name]
+      else:
+        os.environ[name] = value
