@@ -17,6 +17,7 @@ from typing import Any
 import dm_env
 import numpy as np
 
+from lfgp_dmc import graphics
 from lfgp_dmc.observations import (
   OBSERVATION_SIZE,
   OBSERVATION_SLICES,
@@ -64,6 +65,7 @@ def load(
   Raises:
     ValueError: an unknown task, option or value; the message lists the valid.
   """
+  graphics.choose_backend()  # before the first import of MuJoCo
   import tasks
 
   return tasks.load(task, seed=seed, **options)

@@ -1,0 +1,93 @@
+"""Who acts: the intentions of a run or a policy folder, or an expert.
+
+Everything here can be pickled into worker processes, and imports the
+simulator or torch only when it is called.
+"""
+
+import dataclasses
+import functools
+import os
+import pathlib
+from collections.abc import Callable
+from typing import Any
+
+import lfgp_dmc
+from launch.command import UserError
+from lfgp_dmc import run_folder
+from lfgp_dmc.types import Actor
+
+SCRIPTED = "scripted"
+_ARRAYS = "policy.safetensors"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cast:
+  """An actor to be made, and where it is at home."""
+
+  make: Callable[[], Actor]  # picklable
+  name: str  # for tables and sidecars
+  main_task: str  # whose environment
+  tasks: tuple[str, ...]  # what it can do, the main task first
+  environment: str = ""  # see `worlds.factory`
+  folder: pathlib.Path | None = None  # of a run
+  config: dict[str, Any] = dataclasses.field(default_factory=dict)
+  env_step: int = 0  # how long it was trained
+
+
+def scripted_expert() -> Actor:
+  """Makes the scripted expert of all nine tasks."""
+  from tasks import experts
+
+  return experts.make_expert()
+
+
+def stored_policy(folder: str) -> Actor:
+  """Reads the policy of a run or policy folder."""
+  import torch
+
+  from agents.policy import Policy
+
+  torch.set_num_threads(1)  # one row at a time: threads only get in the way
+  return Policy.load(folder)
+
+
+def find(run: str, expert: str, task: str = "") -> Cast:
+  """The actor that `--run` or `--expert` names.
+
+  Args:
+    run: a run or policy folder, or "".
+    expert: "scripted", a run folder, or "".
+    task: for the scripted expert, the task whose environment is loaded.
+
+  Raises:
+    UserError: none or both are given, or the folder holds no policy.
+  """
+  if bool(run) == bool(expert):
+    raise UserError("give one of --run=FOLDER and --expert=scripted")
+  if expert == SCRIPTED:
+    task = task or lfgp_dmc.MAIN_TASKS[0]
+    tasks = (task, *(t for t in lfgp_dmc.ALL_TASKS if t != task))
+    return Cast(scripted_expert, "scripted expert", task, tasks)
+  return _of_folder(run or expert)
+
+
+def _of_folder(folder: str) -> Cast:
+  path = pathlib.Path(folder)
+  try:
+    config = run_folder.read_config(path)
+    if not (path / _ARRAYS).is_file():
+      raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
+    policy: Any = stored_policy(folder)
+  except (ValueError, OSError) as error:
+    raise UserError(str(error)) from None
+  main_task = config.get("main_task", policy.tasks[0])
+  return Cast(
+    functools.partial(stored_policy, os.fspath(path)),
+    path.name,
+    main_task,
+    (main_task, *(t for t in policy.tasks if t != main_task)),
+    config.get("environment", ""),
+    path,
+    config,
+    int(config.get("policy", {}).get("env_step", 0)),
+  )

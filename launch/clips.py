@@ -1,0 +1,106 @@
+"""Plays one episode and makes frames of it, with what is going on on top."""
+
+import dataclasses
+from collections.abc import Callable
+
+import dm_env
+import numpy as np
+
+from lfgp_dmc import environments, video
+from lfgp_dmc.types import Actor
+
+Switch = Callable[[int, dm_env.TimeStep], str]
+
+
+@dataclasses.dataclass(frozen=True)
+class Look:
+  """How frames are made."""
+
+  height: int = 480
+  width: int = 640
+  camera: str = "three_quarter"
+  every: int = 1  # control steps a frame
+  overlay: bool = True
+
+
+@dataclasses.dataclass
+class Clip:
+  """Frames, and what they show."""
+
+  frames: list[np.ndarray]
+  labels: list[str]  # the intention of each frame
+  first_success: dict[str, int]  # task -> control step
+  steps: int
+
+
+def record(
+  environment: dm_env.Environment,
+  actor: Actor,
+  first: dm_env.TimeStep,
+  choose: Switch,
+  seed: int,
+  look: Look,
+  max_steps: int | None = None,
+  until_success_of: str | None = None,
+) -> Clip:
+  """Plays from `first` to the episode's end and renders it.
+
+  Args:
+    environment: a Composer environment, just reset.
+    actor: begins a task whenever `choose` names another.
+    first: the reset's timestep.
+    choose: control step, timestep -> the task that acts now.
+    seed: of the actor.
+    look: how frames are made.
+    max_steps: control steps at most; None: the whole episode.
+    until_success_of: stop one second after this task's success.
+
+  Returns:
+    The clip.
+  """
+  flatten = environments.flattener(environment)
+  clip, timestep, task, tail = Clip([], [], {}, 0), first, "", 0
+  while True:
+    wanted = choose(clip.steps, timestep)
+    if wanted != task:
+      task = wanted
+      actor.begin(task, seed + clip.steps)
+    if clip.steps % look.every == 0 or timestep.last():
+      clip.frames.append(_frame(environment, timestep, task, clip, look))
+      clip.labels.append(task)
+    if timestep.last() or clip.steps == max_steps:
+      return clip
+    timestep = environment.step(actor.act(flatten(timestep.observation)))
+    clip.steps += 1
+    for name in set(_successes(timestep)) - set(clip.first_success):
+      clip.first_success[name] = clip.steps
+    if until_success_of in clip.first_success:
+      tail += 1
+      if tail > _TAIL:
+        return clip
+
+
+_TAIL = 20  # control steps shown after a success
+
+
+def _successes(timestep: dm_env.TimeStep) -> list[str]:
+  prefix = "success/"
+  return [
+    name.removeprefix(prefix)
+    for name, value in timestep.observation.items()
+    if name.startswith(prefix) and bool(value)
+  ]
+
+
+def _frame(environment, timestep, task: str, clip: Clip, look: Look):
+  physics = environment.physics
+  frame = physics.render(look.height, look.width, camera_id=look.camera)
+  if not look.overlay:
+    return frame
+  has_succeeded = bool(environments.has_succeeded(timestep, task))
+  return video.label(
+    frame,
+    task.replace("_", " "),
+    f"{'success   ' if has_succeeded else ''}step {clip.steps}",
+    highlight=has_succeeded,
+  )

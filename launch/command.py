@@ -1,0 +1,112 @@
+"""What every command shares: starting up, and bad input in one clear line."""
+
+import contextlib
+import logging
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+
+from absl import app, flags
+
+from lfgp_dmc import graphics
+
+INTERRUPTED = 130  # exit status after SIGINT or SIGTERM
+
+
+class UserError(Exception):
+  """Bad input: printed as it is, without a traceback, and exit status 1."""
+
+
+def run(
+  main: Callable[[], int | None],
+  *,
+  render: bool = False,
+  window: bool = False,
+  define_flags: Callable[[Sequence[str]], None] | None = None,
+) -> None:
+  """Runs a command and exits.
+
+  Args:
+    main: the command; reads its own flags; its result is the exit status.
+    render: whether it makes pictures (see `graphics.choose_backend`).
+    window: whether it opens a window.
+    define_flags: defines flags that depend on other arguments; gets them with
+      flagfiles expanded.
+  """
+  graphics.choose_backend(render, window)
+  logging.getLogger("absl").addFilter(_is_worth_saying)
+
+  def guarded_main(argv: Sequence[str]) -> int | None:
+    if len(argv) > 1:
+      return _fail(f"unexpected argument {argv[1]!r}; flags start with --")
+    return guarded(main)
+
+  def parse(argv: Sequence[str]) -> list[str]:
+    if define_flags is not None:
+      try:
+        define_flags(flags.FLAGS.read_flags_from_files(list(argv[1:])))
+      except (flags.Error, ValueError) as error:
+        sys.exit(_fail(str(error)))
+    return app.parse_flags_with_usage(list(argv))
+
+  app.run(guarded_main, flags_parser=parse)
+
+
+def guarded(main: Callable[[], int | None]) -> int | None:
+  """Calls a command; bad input and failing disks are told in a few words."""
+  try:
+    return main()
+  except UserError as error:
+    return _fail(str(error))
+  except BrokenPipeError:  # such as `| head`
+    return 1
+  except OSError as error:
+    return _fail(str(error))
+  except KeyboardInterrupt:
+    print("\ninterrupted", file=sys.stderr)
+    return INTERRUPTED
+
+
+@contextlib.contextmanager
+def checked_input() -> Iterator[None]:
+  """Turns what reading bad input raises into a `UserError`.
+
+  Only for blocks that read what the user gave: elsewhere a ValueError is a
+  fault of ours and deserves its traceback.
+  """
+  try:
+    yield
+  except (ValueError, FileNotFoundError, FileExistsError) as error:
+    raise UserError(str(error)) from error
+
+
+def cores() -> int:
+  """Cores that this process may use."""
+  if hasattr(os, "sched_getaffinity"):
+    return len(os.sched_getaffinity(0))
+  return os.cpu_count() or 1
+
+
+def check_choice(flag: str, value: str, valid: Sequence[str]) -> str:
+  """Returns `value`; raises UserError that lists the valid ones."""
+  if value not in valid:
+    raise UserError(f"--{flag}={value} is unknown; valid: {', '.join(valid)}")
+  return value
+
+
+def check_least(flag: str, value: int, least: int) -> int:
+  """Returns `value`; raises UserError if it is below `least`."""
+  if value < least:
+    raise UserError(f"--{flag}={value}; valid: {least} or more")
+  return value
+
+
+def _is_worth_saying(record: logging.LogRecord) -> bool:
+  """Leaves out what libraries say about themselves when imported."""
+  is_theirs = any(name in record.pathname for name in ("dm_control", "OpenGL"))
+  return not is_theirs or record.levelno >= logging.WARNING
+
+
+def _fail(message: str) -> int:
+  print(f"error: {message}", file=sys.stderr)
+  return 1

@@ -1,0 +1,100 @@
+"""The flags `--preset` and `--config.x.y=...`, and what they come to.
+
+The fields under `config.agent` depend on the algorithm and their defaults on
+the preset, so both are looked up among the arguments before the flag `config`
+is defined with them.
+"""
+
+import difflib
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from absl import flags
+from ml_collections import config_flags
+
+from launch import configs
+
+_PRESET = flags.DEFINE_string(
+  "preset",
+  "paper",
+  "Defaults of the config: paper (the paper's tables), ral (the authors' later "
+  "journal version) or fast (ours, provisional). --config.x=... overrides.",
+)
+
+
+def define(arguments: Sequence[str]) -> None:
+  """Defines `--config.*` for the algorithm and preset among the arguments.
+
+  Args:
+    arguments: of the command, with flagfiles expanded.
+
+  Raises:
+    ValueError: an unknown algorithm or preset.
+  """
+  algorithm = _last(arguments, "config.algorithm", "lfgp")
+  preset = _last(arguments, "preset", "paper")
+  defaults = configs.make_config(algorithm, preset)
+  known = dict(_flattened(defaults.to_dict()))
+  for argument in arguments:
+    name = _name(argument)
+    if name.startswith("config.") and name[len("config.") :] not in known:
+      raise ValueError(f"unknown --{name}; {_hint(name, known)}")
+  config_flags.DEFINE_config_dict(
+    "config",
+    defaults,
+    "Settings of the run, as --config.NAME=VALUE; what they mean is said in "
+    "launch/configs/run_config.py and agents/*/config.py. Now:\n"
+    + "\n".join(f"--config.{name}={value}" for name, value in known.items()),
+  )
+  for name in ("config", "preset"):  # so that --help shows them
+    flags.FLAGS.register_key_flag_for_module(sys.argv[0], flags.FLAGS[name])
+
+
+def resolved() -> configs.RunConfig:
+  """The checked config of the parsed flags.
+
+  Raises:
+    ValueError: a value out of its range.
+  """
+  return configs.to_run_config(flags.FLAGS.config)
+
+
+def is_given() -> bool:
+  """Whether a preset or any setting was given, in a flagfile or not."""
+  overrides = config_flags.get_override_values(flags.FLAGS["config"])
+  return bool(overrides) or flags.FLAGS["preset"].present > 0
+
+
+def _flattened(
+  values: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+  for name, value in values.items():
+    if isinstance(value, dict):
+      yield from _flattened(value, f"{prefix}{name}.")
+    else:
+      yield prefix + name, value
+
+
+def _hint(name: str, known: Mapping[str, Any]) -> str:
+  names = [f"--config.{field}" for field in known]
+  close = difflib.get_close_matches(f"--{name}", names)
+  return f"did you mean {' or '.join(close)}?" if close else "see --help"
+
+
+def _name(argument: str) -> str:
+  return argument.lstrip("-").partition("=")[0] if argument[:1] == "-" else ""
+
+
+def _last(arguments: Sequence[str], name: str, default: str) -> str:
+  """The value of the last `--name=value` or `--name value`."""
+  found = default
+  for i, argument in enumerate(arguments):
+    if _name(argument) != name:
+      continue
+    _, equals, value = argument.partition("=")
+    if equals:
+      found = value
+    elif i + 1 < len(arguments):
+      found = arguments[i + 1]
+  return found

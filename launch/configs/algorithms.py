@@ -1,0 +1,42 @@
+"""The algorithms by name: their settings, tasks and builders."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import lfgp_dmc
+from agents import lfgp
+from agents.lfgp import LfgpAgent, LfgpConfig
+
+# `move_object` is the paper's pre-training task for transfer.
+MAIN_TASKS = (*lfgp_dmc.MAIN_TASKS, "move_object")
+
+
+@dataclasses.dataclass(frozen=True)
+class Algorithm:
+  """How an algorithm is made from a run's config."""
+
+  summary: str
+  agent_config: type  # a frozen dataclass with defaults for every field
+  build: Callable[..., LfgpAgent]  # see `agents.lfgp.build`
+  defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+  is_multitask: bool = True  # learns all of `task_set`, or the main task alone
+
+  def make_agent_config(self) -> Any:
+    """The agent's config with this algorithm's defaults."""
+    return self.agent_config(**self.defaults)
+
+
+ALGORITHMS: dict[str, Algorithm] = {
+  "lfgp": Algorithm(
+    "Learning from Guided Play with a learned scheduler",
+    LfgpConfig,
+    lfgp.build,
+  ),
+  "lfgp_ns": Algorithm(
+    "the same without a scheduler: only the main intention acts",
+    LfgpConfig,
+    lfgp.build,
+    defaults={"scheduler": "main_only"},
+  ),
+}

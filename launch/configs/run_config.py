@@ -1,0 +1,89 @@
+"""Every setting of a run but the agent's own, checked when it is made."""
+
+import dataclasses
+from typing import Any
+
+from launch.configs import algorithms
+
+
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class RunConfig:
+  """One run, whatever its algorithm; steps are environment steps.
+
+  The defaults here and those of the agent's config are the paper's; presets
+  and flags change them, and `config.json` of the run holds the result.
+  """
+
+  algorithm: str = "lfgp"
+  main_task: str = "stack"
+  seed: int = 0
+  env_steps: int = 4_000_000
+
+  # Demonstrations.
+  demonstrations: str = ""  # dataset folder: a file a task
+  pairs_per_task: int = 0  # use the first so many of each file; 0: all
+  collect_pairs: int = 0  # collect so many a task if there is no folder
+
+  # Where the agent acts: ours, or `package.module:factory` of any dm_env.
+  environment: str = ""
+
+  # When things happen.
+  log_every: int = 500
+  evaluate_every: int = 100_000
+  checkpoint_every: int = 20_000
+  evaluate_first: bool = False  # also the untrained agent
+
+  # Evaluation: every intention, mean action, the same resets for all runs.
+  evaluation_episodes: int = 50  # a task
+  evaluation_seed: int = 0
+  evaluation_workers: int = 0  # processes; 0: one a core
+
+  # Resources.
+  replay_capacity: int = 4_000_000  # transitions
+  device: str = "auto"  # cpu, cuda, ...; auto: cuda where there is one
+  threads: int = 1  # of torch; 0: torch's own choice
+  deterministic: bool = False  # the same numbers again, after a resume too
+
+  agent: Any = None  # the dataclass of the algorithm's own settings
+
+  def __post_init__(self):
+    """Raises ValueError that lists every field out of its range."""
+    faults = [
+      f"config.{name} is {getattr(self, name)!r}; valid: {least} or more"
+      for least, names in _LEAST.items()
+      for name in names.split()
+      if not _is_integer(getattr(self, name)) or getattr(self, name) < least
+    ]
+    if self.algorithm not in algorithms.ALGORITHMS:
+      faults.append(
+        f"config.algorithm is {self.algorithm!r}; valid: "
+        f"{', '.join(algorithms.ALGORITHMS)}"
+      )
+    if self.environment and ":" not in self.environment:
+      faults.append(
+        f"config.environment is {self.environment!r}; valid: nothing (the "
+        "block tasks) or package.module:factory"
+      )
+    if not self.environment and self.main_task not in algorithms.MAIN_TASKS:
+      faults.append(
+        f"config.main_task is {self.main_task!r}; valid: "
+        f"{', '.join(algorithms.MAIN_TASKS)}"
+      )
+    if faults:
+      raise ValueError("\n".join(faults))
+
+  def to_dict(self) -> dict[str, Any]:
+    """What `config.json` holds; `configs.from_dict` reads it back."""
+    return dataclasses.asdict(self)
+
+
+def _is_integer(value: Any) -> bool:
+  return isinstance(value, int) and not isinstance(value, bool)
+
+
+_LEAST = {
+  0: "seed pairs_per_task collect_pairs evaluation_seed evaluation_workers "
+  "threads",
+  1: "env_steps log_every evaluate_every checkpoint_every "
+  "evaluation_episodes replay_capacity",
+}

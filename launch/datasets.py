@@ -1,0 +1,80 @@
+"""The demonstrations of a run: read whole, or collected first if it may."""
+
+import pathlib
+import subprocess
+import sys
+from collections.abc import Sequence
+
+from launch.command import UserError
+from launch.configs import RunConfig
+from lfgp_dmc import demonstrations
+from lfgp_dmc.demonstrations import Demonstrations
+
+_COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
+
+
+def load(
+  config: RunConfig, tasks: Sequence[str], widths: tuple[int, int]
+) -> dict[str, Demonstrations]:
+  """Task -> demonstrations, checked against the environment's widths.
+
+  Raises:
+    UserError: the dataset cannot be used; one line a faulty file.
+  """
+  if not config.demonstrations:
+    raise UserError(
+      "config.demonstrations is not set: give the dataset's folder, see "
+      "launch/collect_demonstrations.py"
+    )
+  folder = pathlib.Path(config.demonstrations)
+  if not folder.exists():
+    collect_if_asked(config)
+  try:
+    found = demonstrations.read_folder(folder, tasks, *widths)
+  except ValueError as error:
+    hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
+    raise UserError(f"{error}{hint}") from None
+  if not config.pairs_per_task:
+    return found
+  short = [
+    f"{task} ({len(data)})"
+    for task, data in found.items()
+    if len(data) < config.pairs_per_task
+  ]
+  if short:
+    raise UserError(
+      f"config.pairs_per_task is {config.pairs_per_task}; {folder} has fewer "
+      f"pairs of {', '.join(short)}"
+    )
+  return {
+    task: data.head(config.pairs_per_task) for task, data in found.items()
+  }
+
+
+def collect_if_asked(config: RunConfig) -> None:
+  """Collects the dataset if `config.collect_pairs` says so.
+
+  Raises:
+    UserError: it could not be collected.
+  """
+  if not config.collect_pairs:
+    return
+  command = _command(config, str(config.collect_pairs))
+  print(f"collecting demonstrations: {command}", flush=True)
+  arguments = [sys.executable, str(_COLLECT), *command.split()[2:]]
+  if subprocess.run(arguments).returncode:
+    raise UserError(f"{config.demonstrations} could not be collected")
+
+
+def pairs(found: dict[str, Demonstrations]) -> str:
+  """Such as "7 tasks, 63000 pairs"."""
+  total = sum(len(data) for data in found.values())
+  return f"{len(found)} tasks, {total} pairs"
+
+
+def _command(config: RunConfig, pairs_per_task: str) -> str:
+  return (
+    f"python launch/collect_demonstrations.py --task={config.main_task} "
+    f"--pairs_per_task={pairs_per_task} --seed={config.seed} "
+    f"--output={config.demonstrations}"
+  )

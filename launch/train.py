@@ -1,0 +1,82 @@
+"""Trains an agent by a flagfile, and continues a run that was stopped.
+
+  python launch/train.py --flagfile=launch/flags/lfgp_stack.flags \
+      --config.seed=1 --run=runs/stack_1
+  python launch/train.py --run=runs/stack_1 --resume
+
+The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
+events, checkpoints/, replay/ and policy.safetensors.
+"""
+
+import pathlib
+
+from absl import flags
+
+from launch import command, config_flags, configs, training
+from launch.command import UserError
+from lfgp_dmc import evaluation, loop, run_folder
+
+_RUN = flags.DEFINE_string(
+  "run", "", "The run's folder; default: a new one under runs/."
+)
+_RESUME = flags.DEFINE_bool(
+  "resume",
+  False,
+  "Continue --run from its last good checkpoint, with its own config.",
+)
+
+
+def main() -> int:
+  """Resolves the config, trains, and says where everything is."""
+  path, config = pathlib.Path(_RUN.value), _config()
+  if not _RUN.value:
+    path = run_folder.default_path(config.algorithm, config.main_task)
+  print(f"{config.algorithm} on {config.main_task}, run folder {path}")
+  progress = training.train(config, path, _RESUME.value)
+  return report(config, path, progress)
+
+
+def report(
+  config: configs.RunConfig, path: pathlib.Path, progress: loop.Progress
+) -> int:
+  """Prints the last evaluation and the places; returns the exit status."""
+  if progress.env_step < config.env_steps:
+    print(
+      f"stopped at step {progress.env_step} of {config.env_steps}; continue: "
+      f"python launch/train.py --run={path} --resume"
+    )
+    return command.INTERRUPTED
+  rows = evaluation.read_csv(path / "evaluation.csv")
+  print(f"\nsuccess after {progress.env_step} environment steps:")
+  last = max(row.env_step for row in rows)
+  print(evaluation.success_table([row for row in rows if row.env_step == last]))
+  print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")
+  print(f"evaluation   {path / 'evaluation.csv'}")
+  print(f"policy       {path / 'policy.safetensors'}")
+  return 0
+
+
+def _config() -> configs.RunConfig:
+  """The config of the flags, or on a bare --resume the run's own.
+
+  Raises:
+    UserError: a wrong value, or --resume without --run.
+  """
+  with command.checked_input():
+    if not _RESUME.value:
+      return config_flags.resolved()
+    if not _RUN.value:
+      raise UserError("--resume needs --run: the folder to continue")
+    if config_flags.is_given():
+      return config_flags.resolved()
+    stored = run_folder.read_config(_RUN.value)
+    for name in run_folder.ADDED_FIELDS:
+      stored.pop(name, None)
+    try:
+      return configs.from_dict(stored)
+    except ValueError as error:
+      raise UserError(f"{_RUN.value}/config.json: {error}") from None
+
+
+if __name__ == "__main__":
+  command.run(main, define_flags=config_flags.define)

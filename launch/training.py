@@ -1,0 +1,241 @@
+"""One run from its config: environment, demonstrations, agent, loop, files."""
+
+import contextlib
+import functools
+import os
+import pathlib
+import shutil
+from collections.abc import Iterator
+
+import dm_env
+import safetensors.numpy
+import torch
+
+from launch import actors, command, datasets, worlds
+from launch.command import UserError
+from launch.configs import ALGORITHMS, RunConfig
+from lfgp_dmc import (
+  environments,
+  evaluation,
+  files,
+  loop,
+  resuming,
+  run_folder,
+  seeding,
+  task_names,
+)
+from lfgp_dmc.demonstrations import Demonstrations
+from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.replay import Replay
+from lfgp_dmc.run_folder import RunFolder
+
+_ARRAYS = "policy.safetensors"
+_DETERMINISTIC_CUBLAS = ":4096:8"
+
+
+def train(
+  config: RunConfig,
+  path: pathlib.Path,
+  resume: bool = False,
+  progress_bar: bool = True,
+) -> loop.Progress:
+  """Trains, or goes on training, in a run's folder.
+
+  Args:
+    config: the resolved config.
+    path: the run's folder; it exists exactly if `resume`.
+    resume: whether to continue from its last good checkpoint.
+    progress_bar: whether to show one.
+
+  Returns:
+    The loop's counters; fewer steps than asked for mean it was stopped.
+
+  Raises:
+    UserError: bad input; nothing was written, and no folder is left behind.
+  """
+  if not resume and path.exists():
+    raise UserError(
+      f"{path} exists; continue it with --resume, or choose another --run"
+    )
+  device = set_up_torch(config)
+  with command.checked_input():
+    environment = worlds.build(config.environment, config.main_task)
+    tasks = tasks_of(config, environment)
+    widths = environments.widths(environment)
+  shown = datasets.load(config, tasks, widths)
+  print(f"demonstrations: {config.demonstrations}, {datasets.pairs(shown)}")
+  with _opened(config, path, resume) as run:
+    return _Run(config, run, environment, tasks, shown, device).train(
+      resume, progress_bar
+    )
+
+
+def tasks_of(
+  config: RunConfig, environment: dm_env.Environment
+) -> tuple[str, ...]:
+  """The tasks that are learned, the main task first."""
+  if not ALGORITHMS[config.algorithm].is_multitask:
+    return (config.main_task,)
+  if config.environment:
+    return worlds.tasks_of(environment, config.main_task)
+  return task_names.task_set(config.main_task)
+
+
+def set_up_torch(config: RunConfig) -> torch.device:
+  """Threads, determinism and device, before any work.
+
+  Raises:
+    UserError: there is no such device.
+  """
+  if config.threads:
+    torch.set_num_threads(config.threads)
+  if config.deterministic:
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", _DETERMINISTIC_CUBLAS)
+    torch.use_deterministic_algorithms(True)
+  name = config.device
+  if name == "auto":
+    name = "cuda" if torch.cuda.is_available() else "cpu"
+  try:
+    device = torch.device(name)
+    torch.zeros(1, device=device)
+  except (RuntimeError, AssertionError, NotImplementedError) as error:
+    reason = str(error).partition("\n")[0]
+    raise UserError(
+      f"config.device is {config.device!r}: {reason}; valid: auto, cpu, or "
+      "cuda where this build of torch finds one"
+    ) from None
+  return device
+
+
+def evaluate_policy(
+  config: RunConfig,
+  folder: pathlib.Path,
+  tasks: tuple[str, ...],
+  env_step: int,
+  progress_bar: bool,
+) -> list[evaluation.EvaluationRow]:
+  """Plays the stored policy: every task, the config's episodes and seed."""
+  return evaluation.evaluate(
+    worlds.factory(config.environment, config.main_task, True),
+    functools.partial(actors.stored_policy, os.fspath(folder)),
+    tasks,
+    config.evaluation_episodes,
+    config.evaluation_seed,
+    config.evaluation_workers or command.cores(),
+    progress_bar,
+    env_step,
+  )
+
+
+class _Run:
+  """The parts of one run, put together."""
+
+  def __init__(
+    self,
+    config: RunConfig,
+    run: RunFolder,
+    environment: dm_env.Environment,
+    tasks: tuple[str, ...],
+    shown: dict[str, Demonstrations],
+    device: torch.device,
+  ):
+    self._config, self._run, self._tasks = config, run, tasks
+    self._environment = environment
+    widths = environments.widths(environment)
+    # A full ring must still hold the rows of the last checkpoint.
+    episode = getattr(config.agent, "episode_steps", 0)
+    is_ring = config.replay_capacity < config.env_steps
+    self._replay = Replay(
+      config.replay_capacity,
+      *widths,
+      run.replay,
+      slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+    )
+    self._agent = ALGORITHMS[config.algorithm].build(
+      config.agent,
+      tasks,
+      shown,
+      self._replay,
+      seeding.derive(config.seed, "agent"),
+      device,
+      *widths,
+    )
+
+  def train(self, resume: bool, progress_bar: bool) -> loop.Progress:
+    """Runs the loop to its end or to a signal."""
+    config, run = self._config, self._run
+    self._progress_bar = progress_bar
+    log = MetricsLog(run.path)
+    progress = None
+    if resume:
+      progress = resuming.restore(run, self._agent, self._replay, log)
+    self._save_policy(progress.env_step if progress else 0)
+    try:
+      return loop.train(
+        self._environment,
+        self._agent,
+        self._replay,
+        _schedule(config, progress_bar),
+        log,
+        self._evaluate,
+        self._checkpoint,
+        seed=seeding.derive(config.seed, "environment"),
+        progress=progress,
+      )
+    finally:
+      log.close()
+      self._environment.close()
+
+  def _evaluate(self, env_step: int) -> dict[str, float]:
+    self._save_policy(env_step)
+    rows = evaluate_policy(
+      self._config, self._run.path, self._tasks, env_step, self._progress_bar
+    )
+    evaluation.append_csv(self._run.evaluation, rows)
+    return evaluation.success_rates(rows)
+
+  def _checkpoint(self, progress: loop.Progress) -> None:
+    self._save_policy(progress.env_step)
+    resuming.save(
+      self._run, self._agent, self._replay, progress, self._config.env_steps
+    )
+
+  def _save_policy(self, env_step: int) -> None:
+    """Makes the run's folder a policy folder of the present policy."""
+    path = self._run.path / _ARRAYS
+    with files.replacing(path) as aside:
+      safetensors.numpy.save_file(self._agent.policy_arrays(), aside)
+    options = {**self._agent.policy_options(), "env_step": env_step}
+    files.write_json(
+      self._run.config, {**self._config.to_dict(), "policy": options}
+    )
+
+
+def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
+  return loop.TrainSchedule(
+    env_steps=config.env_steps,
+    log_every=config.log_every,
+    evaluate_every=config.evaluate_every,
+    checkpoint_every=config.checkpoint_every,
+    warmup_steps=config.agent.warm_up,
+    updates_per_step=config.agent.updates_per_step,
+    evaluate_first=config.evaluate_first,
+    progress_bar=progress_bar,
+  )
+
+
+@contextlib.contextmanager
+def _opened(
+  config: RunConfig, path: pathlib.Path, resume: bool
+) -> Iterator[RunFolder]:
+  """The run's folder; one made for a run that cannot start is removed."""
+  with command.checked_input():
+    open_folder = run_folder.resume if resume else run_folder.create
+    run = open_folder(path, config.to_dict())
+  try:
+    yield run
+  except ValueError as error:
+    if not resume and not run.metrics.exists():
+      shutil.rmtree(path)
+      raise UserError(str(error)) from error
+    raise

@@ -1,0 +1,66 @@
+"""Opens dm_control's viewer on a task, alone or with someone acting.
+
+  python launch/view.py --task=stack
+  python launch/view.py --task=insert --expert=scripted
+  python launch/view.py --run=runs/stack_1 --task=reach
+
+Without --run or --expert the arm holds still, to be looked at and pushed.
+"""
+
+import numpy as np
+from absl import flags
+
+import lfgp_dmc
+from launch import actors, command, worlds
+from launch.command import UserError
+from lfgp_dmc import environments, graphics
+
+_TASK = flags.DEFINE_string(
+  "task", "", "The task to look at; with --run, the intention that acts."
+)
+_RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
+_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
+
+
+def main() -> None:
+  """Opens the window."""
+  task = _TASK.value
+  if task and not _RUN.value:
+    command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
+  cast = None
+  if _RUN.value or _EXPERT.value:
+    if _EXPERT.value:
+      command.check_choice("expert", _EXPERT.value, (actors.SCRIPTED,))
+    cast = actors.find(_RUN.value, _EXPERT.value, task)
+    task = task or cast.main_task
+    command.check_choice("task", task, cast.tasks)
+  if not graphics.has_display():
+    raise UserError(
+      "the viewer needs a display, and there is none (DISPLAY is not set); "
+      "without one, launch/render_policy.py makes videos"
+    )
+  _open(cast, task or lfgp_dmc.MAIN_TASKS[0])
+
+
+def _open(cast: actors.Cast | None, task: str) -> None:
+  from dm_control import viewer
+
+  main_task = cast.main_task if cast else task
+  environment = worlds.build(
+    cast.environment if cast else "", main_task, seed=_SEED.value
+  )
+  policy = None
+  if cast:
+    actor, flatten = cast.make(), environments.flattener(environment)
+
+    def policy(timestep) -> np.ndarray:
+      if timestep.first():
+        actor.begin(task, _SEED.value)
+      return actor.act(flatten(timestep.observation))
+
+  viewer.launch(environment, policy, title=f"LfGP-DMC: {task}")
+
+
+if __name__ == "__main__":
+  command.run(main, window=True)

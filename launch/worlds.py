@@ -1,0 +1,73 @@
+"""Environments by the config's names; importable by worker processes."""
+
+import functools
+import importlib
+import inspect
+from collections.abc import Callable, Mapping
+
+import dm_env
+
+import lfgp_dmc
+from lfgp_dmc.observations import SUCCESS_PREFIX
+
+_REWARD = "reward/"
+
+
+def factory(
+  environment: str, main_task: str, show_rewards: bool = False
+) -> Callable[..., dm_env.Environment]:
+  """A picklable function that builds an environment, taking `seed=` or not.
+
+  Args:
+    environment: "" for the block tasks, or `package.module:factory`.
+    main_task: the task that is loaded.
+    show_rewards: whether each task's dense reward is observed, for returns.
+  """
+  return functools.partial(build, environment, main_task, show_rewards)
+
+
+def build(
+  environment: str,
+  main_task: str,
+  show_rewards: bool = False,
+  seed: int | None = None,
+) -> dm_env.Environment:
+  """Builds an environment; see `factory`.
+
+  Raises:
+    ValueError: there is no such task or factory; the message says what is.
+  """
+  if environment:
+    make = _imported(environment)
+    if seed is not None and "seed" in inspect.signature(make).parameters:
+      return make(seed=seed)
+    return make()
+  built = lfgp_dmc.load(main_task, seed=seed)
+  if show_rewards:
+    for name, observable in built.task.observables.items():
+      if name.startswith(_REWARD):
+        observable.enabled = True
+  return built
+
+
+def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:
+  """The tasks that an environment tells the success of, `main_task` first."""
+  spec = environment.observation_spec()
+  found = []
+  if isinstance(spec, Mapping):
+    found = [
+      name.removeprefix(SUCCESS_PREFIX)
+      for name in spec
+      if name.startswith(SUCCESS_PREFIX)
+    ]
+  return (main_task, *(task for task in found if task != main_task))
+
+
+def _imported(path: str) -> Callable[..., dm_env.Environment]:
+  module_name, _, name = path.partition(":")
+  try:
+    return getattr(importlib.import_module(module_name), name)
+  except (ImportError, AttributeError) as error:
+    raise ValueError(
+      f"config.environment={path}: {error}; valid: package.module:factory"
+    ) from None

@@ -1,0 +1,123 @@
+"""Chooses how MuJoCo draws, which is fixed once it has been imported.
+
+MuJoCo and dm_control read `MUJOCO_GL` at their first import. With no display
+and no choice they take GLFW, warn, and fail at the first picture; so whoever
+imports them first calls `choose_backend` before.
+"""
+
+import ctypes
+import ctypes.util
+import os
+import sys
+
+BACKENDS = ("glfw", "egl", "osmesa", "off")
+INSTALL = (
+  "install Mesa's EGL (Debian, Ubuntu: apt-get install libegl1 libegl-mesa0 "
+  "libgl1-mesa-dri libgles2)"
+)
+
+_GL = "MUJOCO_GL"
+_PLATFORM = "PYOPENGL_PLATFORM"
+_OFF = ("off", "disable", "disabled", "false", "0")
+_PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
+_MOST_DEVICES = 16
+
+
+def choose_backend(render: bool = True, window: bool = False) -> str:
+  """Sets `MUJOCO_GL` and `PYOPENGL_PLATFORM` for this process and its children.
+
+  A `MUJOCO_GL` that the user set is kept, and nothing changes once MuJoCo has
+  been imported.
+
+  Args:
+    render: whether pictures are needed; without them nothing is loaded.
+    window: whether they go to a window on a display.
+
+  Returns:
+    One of `BACKENDS`; "off" where pictures cannot be made, see `fault`.
+  """
+  chosen = os.environ.get(_GL, "").lower().strip()
+  if chosen in _OFF:
+    chosen = "off"
+  if not chosen and not {"mujoco", "dm_control"} & set(sys.modules):
+    chosen = _best(render, window)
+    os.environ[_GL] = chosen
+  if chosen in ("egl", "osmesa"):
+    os.environ[_PLATFORM] = chosen
+  return chosen or "glfw"
+
+
+def fault() -> str:
+  """Why this process cannot draw, and what to do; empty if it can."""
+  chosen = os.environ.get(_GL, "").lower().strip()
+  if chosen in _OFF:
+    return f"no pictures: MUJOCO_GL is {chosen!r}; " + (
+      "unset it" if _egl_works() or _osmesa_works() else INSTALL
+    )
+  if chosen not in ("", *BACKENDS):
+    return f"MUJOCO_GL is {chosen!r}; valid: {', '.join(BACKENDS)}"
+  if chosen == "egl" and not _egl_works():
+    return f"MUJOCO_GL is 'egl', but EGL does not work: {INSTALL}"
+  if chosen == "osmesa" and not _osmesa_works():
+    return "MUJOCO_GL is 'osmesa', but there is no OSMesa: unset it"
+  if chosen in ("", "glfw") and not has_display():
+    return "MUJOCO_GL is 'glfw', but there is no display: unset it"
+  return ""
+
+
+def has_display() -> bool:
+  """Whether a window could be opened."""
+  if sys.platform != "linux":
+    return True
+  return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def _best(render: bool, window: bool) -> str:
+  if window:
+    return "glfw"
+  if not render:
+    return "off"
+  if sys.platform != "linux":
+    return "glfw"
+  if _egl_works():
+    return "egl"
+  if _osmesa_works():
+    return "osmesa"
+  return "glfw" if has_display() else "off"
+
+
+def _osmesa_works() -> bool:
+  return ctypes.util.find_library("OSMesa") is not None
+
+
+def _egl_works() -> bool:
+  """Whether a device (a GPU or Mesa's software) opens without a display."""
+  try:
+    egl = ctypes.CDLL("libEGL.so.1")
+    address = egl.eglGetProcAddress
+  except (OSError, AttributeError):
+    return False
+  address.restype, address.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
+  query = address(b"eglQueryDevicesEXT")
+  get_display = address(b"eglGetPlatformDisplayEXT")
+  if not query or not get_display:
+    return False
+  devices = (ctypes.c_void_p * _MOST_DEVICES)()
+  count = ctypes.c_int(0)
+  query_type = ctypes.CFUNCTYPE(
+    ctypes.c_uint,
+    ctypes.c_int,
+    ctypes.POINTER(ctypes.c_void_p),
+    ctypes.POINTER(ctypes.c_int),
+  )
+  display_type = ctypes.CFUNCTYPE(
+    ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p
+  )
+  if not query_type(query)(_MOST_DEVICES, devices, ctypes.byref(count)):
+    return False
+  for device in devices[: count.value]:
+    display = display_type(get_display)(_PLATFORM_DEVICE, device, None)
+    if display and egl.eglInitialize(ctypes.c_void_p(display), None, None):
+      egl.eglTerminate(ctypes.c_void_p(display))
+      return True
+  return False
