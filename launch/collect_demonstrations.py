@@ -1,6 +1,6 @@
 """Collects demonstrations: `<output>/<task>.hdf5` for each task of T_all.
 
-    python launch/collect_demonstrations.py --task=stack --output=data/stack
+`python launch/collect_demonstrations.py --task=stack --output=data/stack`
 """
 
 import functools
@@ -87,9 +87,7 @@ def main() -> int:
 def _check_flags() -> tuple[pathlib.Path, list[str]]:
   """The output folder and the tasks to collect."""
   command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
-  command.check_choice(
-    "collection", _COLLECTION.value, collection.COLLECTIONS
-  )
+  command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
   command.check_least("seed", _SEED.value, 0)
   if _WORKERS.value is not None:

@@ -180,6 +180,4 @@ class _Pile:
     whole = Demonstrations(
       observation, action, next_observation, episode, is_last
     )
-    return Collected(
-      whole.head(self._pairs), self._attempts, len(self._rows)
-    )
+    return Collected(whole.head(self._pairs), self._attempts, len(self._rows))

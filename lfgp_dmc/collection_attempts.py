@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import dm_env
 import numpy as np
@@ -75,6 +75,7 @@ class Collector:
     self._plan = plan
     self._actor = plan.make_actor()
     self._loaded = ""
+    self._environment: Any = None
 
   def __call__(self, job: Job) -> tuple[str | None, list[Attempt]]:
     """Makes the attempts of a job; returns its task and them, in order."""
@@ -191,9 +192,14 @@ class _Steps:
   def __len__(self) -> int:
     return len(self._steps)
 
-  def add(self, *step: np.ndarray) -> None:
-    """Adds an observation, an action and the next observation."""
-    self._steps.append(step)
+  def add(
+    self,
+    observation: np.ndarray,
+    action: np.ndarray,
+    next_observation: np.ndarray,
+  ) -> None:
+    """Adds a step."""
+    self._steps.append((observation, action, next_observation))
 
   def rows(self) -> Rows:
     """All steps, stacked."""

@@ -12,7 +12,7 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
 # What a worker must find set before it imports anything.
@@ -29,7 +29,7 @@ def ordered(
   make_state: Callable[[], Callable[[Any], Any]],
   jobs: Iterable[Any],
   workers: int,
-) -> Iterator[Any]:
+) -> Generator[Any, None, None]:
   """Yields the result of each job, in order.
 
   Args:
