@@ -1,0 +1,156 @@
+"""Scripted experts: they succeed, from the observation alone, and look right."""
+
+import functools
+import pickle
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+import tasks
+from lfgp_dmc import flatten, seeding
+from lfgp_dmc.task_names import ALL_TASKS
+from tasks import workspace as ws
+from tasks.experts import POLICIES, make_expert
+from tasks.experts.view import look
+
+_STEPS = 360
+_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+@functools.cache
+def _environment(task):
+  return tasks.load(task, seed=0)
+
+
+def _run(environment, task, timestep, seed=0):
+  """Plays until success; returns (succeeded, actions)."""
+  expert = make_expert()
+  expert.begin(task, seed)
+  actions = []
+  for _ in range(_STEPS):
+    actions.append(expert.act(flatten(timestep.observation)))
+    timestep = environment.step(actions[-1])
+    if timestep.observation[f"success/{task}"]:
+      return True, np.array(actions)
+  return False, np.array(actions)
+
+
+def _pose(x, y, z=ws.FLAT_Z):
+  return (x, y, z, *_UPRIGHT)
+
+
+class ExpertTest(parameterized.TestCase):
+  @parameterized.parameters(*ALL_TASKS)
+  def test_succeeds_within_the_ranges_asked_of_its_data(self, task):
+    environment = _environment(task)
+    every = []
+    for i in range(3):
+      environment.reseed(seeding.derive(3, "test", i))
+      success, actions = _run(environment, task, environment.reset(), i)
+      self.assertTrue(success, f"reset {i}")
+      every.append(actions)
+    actions = np.concatenate(every)
+    self.assertEqual(actions.dtype, np.float32)
+    size = np.abs(actions)
+    self.assertLessEqual(size.max(), 1.0)
+    self.assertGreaterEqual(size[:, 3].min(), 0.3)
+    self.assertBetween(size.mean(), 0.2, 0.9)
+    self.assertLess((size > 0.95).mean(), 0.4)
+    grips = np.unique(actions[:, 3])
+    self.assertGreater(len(grips), 0.9 * len(actions))  # continuous
+
+  @parameterized.parameters(*ALL_TASKS)
+  def test_the_observation_alone_decides(self, task):
+    environment = _environment(task)
+    environment.reseed(11)
+    timestep = environment.reset()
+    whole = make_expert(noise=0.0)
+    whole.begin(task, 0)
+    for step in range(120):
+      observation = flatten(timestep.observation)
+      action = whole.act(observation)
+      fresh = make_expert(noise=0.0)
+      fresh.begin(task, step + 1)
+      np.testing.assert_array_equal(fresh.act(observation)[:3], action[:3])
+      timestep = environment.step(action)
+
+  def test_the_seed_decides_the_noise(self):
+    observation = flatten(_environment("reach").reset().observation)
+    actions = []
+    for seed in (1, 1, 2):
+      expert = make_expert()
+      expert.begin("reach", seed)
+      actions.append(expert.act(observation))
+    np.testing.assert_array_equal(actions[0], actions[1])
+    self.assertFalse((actions[0] == actions[2]).any())
+
+  def test_unknown_task_and_noise_list_the_valid_ones(self):
+    with self.assertRaisesRegex(ValueError, "'fly'; valid tasks: stack, "):
+      make_expert().begin("fly", 0)
+    with self.assertRaisesRegex(ValueError, "valid is 0 or more"):
+      make_expert(noise=-0.1)
+    self.assertEqual(tuple(POLICIES), ALL_TASKS)
+
+  def test_the_factory_goes_to_workers(self):
+    make = pickle.loads(pickle.dumps(functools.partial(make_expert, 0.2)))
+    make().begin("lift", 0)
+
+
+class PlayStatesTest(parameterized.TestCase):
+  """States that other tasks leave behind, all in Stack's environment."""
+
+  @parameterized.parameters(
+    "reach", "lift", "stack", "open_gripper", "close_gripper", "move_object"
+  )
+  def test_blue_in_its_slot(self, task):
+    self._check(task, tcp=(0.075, 0.5, 0.17), blue=_pose(*ws.BLUE_SLOT))
+
+  @parameterized.parameters("reach", "lift", "move_object", "stack")
+  def test_green_on_blue(self, task):
+    self._check(
+      task,
+      tcp=(0.0, 0.5, 0.26),
+      blue=_pose(-0.02, 0.46),
+      green=_pose(-0.02, 0.46, ws.STACKED_Z),
+    )
+
+  @parameterized.parameters("reach", "lift", "bring", "move_object")
+  def test_blue_on_green(self, task):
+    self._check(
+      task,
+      tcp=(0.0, 0.5, 0.26),
+      blue=_pose(0.03, 0.55, ws.STACKED_Z),
+      green=_pose(0.03, 0.55),
+    )
+
+  @parameterized.parameters("reach", "open_gripper", "stack", "bring")
+  def test_green_in_hand(self, task):
+    environment = _environment("stack")
+    timestep = environment.reset_to(
+      tcp=(0.0, 0.5, 0.151), green=_pose(0.0, 0.5), blue=_pose(-0.1, 0.5)
+    )
+    for _ in range(12):
+      timestep = environment.step((0, 0, 0, 1))
+    for _ in range(10):
+      timestep = environment.step((0, 0, 0.5, 1))
+    self.assertGreater(look(flatten(timestep.observation)).green.z, 0.17)
+    environment.clear_success()
+    self.assertTrue(_run(environment, task, timestep)[0])
+
+  @parameterized.parameters("reach", "lift")
+  def test_blocks_touching_along_y(self, task):
+    self._check(
+      task,
+      tcp=(0.0, 0.5, 0.2),
+      blue=_pose(0.0, 0.48),
+      green=_pose(0.005, 0.5202),
+    )
+
+  def _check(self, task, **start):
+    environment = _environment("stack")
+    timestep = environment.reset_to(**start)
+    self.assertTrue(_run(environment, task, timestep)[0])
+
+
+if __name__ == "__main__":
+  absltest.main()
