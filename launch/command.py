@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 
 from absl import app, flags
+from absl import logging as absl_logging
 
 from lfgp_dmc import graphics
 
@@ -34,7 +35,7 @@ def run(
       flagfiles expanded.
   """
   graphics.choose_backend(render, window)
-  logging.getLogger("absl").addFilter(_is_worth_saying)
+  absl_logging.get_absl_handler().addFilter(_is_worth_saying)
 
   def guarded_main(argv: Sequence[str]) -> int | None:
     if len(argv) > 1:

@@ -1,0 +1,96 @@
+"""Measures this machine; prints name=value lines.
+
+python launch/benchmark.py --what=environment
+python launch/benchmark.py --what=learner --preset=fast
+python launch/benchmark.py --what=training --config.threads=2
+python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
+"""
+
+import csv
+import pathlib
+from collections.abc import Iterator
+
+from absl import flags
+
+import lfgp_dmc
+from launch import command, config_flags, configs
+from launch.command import UserError
+from lfgp_dmc import files
+
+_WHAT = flags.DEFINE_enum(
+  "what",
+  "environment",
+  ["environment", "learner", "training", "stability"],
+  "environment: control steps a second through dm_env, the physics' alone, "
+  "and a reset's time. learner: updates a second, against matrix products. "
+  "training: steps a second of the whole loop. stability: random steps that "
+  "count NaN, MuJoCo's warnings and lost blocks.",
+)
+_STEPS = flags.DEFINE_integer(
+  "steps",
+  0,
+  "Control steps; default: 7200 (environment), 1000 (training), 200000 a task "
+  "(stability).",
+  lower_bound=0,
+)
+_TASKS = flags.DEFINE_list(
+  "tasks", list(lfgp_dmc.ALL_TASKS), "Of stability: comma-separated."
+)
+_SEED = flags.DEFINE_integer("seed", 0, "Of resets and actions.", lower_bound=0)
+_SECONDS = flags.DEFINE_float(
+  "seconds", 8.0, "Of each of the learner's measurements.", lower_bound=0.0
+)
+_OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
+
+_DEFAULT_STEPS = {"environment": 7_200, "training": 1_000, "stability": 200_000}
+
+
+def main() -> None:
+  """Measures, prints, and writes the CSV file if asked."""
+  for task in _TASKS.value:
+    command.check_choice("tasks", task, lfgp_dmc.ALL_TASKS)
+  output = pathlib.Path(_OUTPUT.value) if _OUTPUT.value else None
+  if output and output.exists():
+    raise UserError(f"{output} exists; choose another --output")
+  with command.checked_input():
+    config = config_flags.resolved()
+  rows = []
+  for name, value in _measurements(config):
+    text = f"{value:.0f}" if value == round(value) else f"{value:.4g}"
+    print(f"{name}={text}", flush=True)
+    rows.append((name, text))
+  if output:
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with (
+      files.replacing(output) as aside,
+      open(aside, "w", newline="", encoding="utf-8") as file,
+    ):
+      csv.writer(file, lineterminator="\n").writerows(
+        [("name", "value"), *rows]
+      )
+
+
+def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
+  # Imported when needed: each needs only the simulator or only torch.
+  steps = _STEPS.value or _DEFAULT_STEPS.get(_WHAT.value, 0)
+  match _WHAT.value:
+    case "environment":
+      from launch.benchmarks import environment
+
+      yield from environment.measure(steps, _SEED.value)
+    case "learner":
+      from launch.benchmarks import learner
+
+      yield from learner.measure(config, _SECONDS.value)
+    case "training":
+      from launch.benchmarks import training
+
+      yield from training.measure(config, steps)
+    case "stability":
+      from launch.benchmarks import stability
+
+      yield from stability.measure(_TASKS.value, steps, _SEED.value)
+
+
+if __name__ == "__main__":
+  command.run(main, define_flags=config_flags.define)

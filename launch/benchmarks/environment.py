@@ -1,0 +1,80 @@
+"""Speed of the simulation: through dm_env, and of the physics alone."""
+
+import time
+from collections.abc import Iterator
+
+import numpy as np
+
+import lfgp_dmc
+
+_TASK = "stack"
+_RESETS = 20
+
+
+def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
+  """Measures on one core, on Stack.
+
+  Args:
+    steps: control steps of each measurement.
+    seed: of resets and actions.
+
+  Yields:
+    `control_steps_per_s`: through the dm_env interface with uniform random
+    actions, resets and `flatten` included. `mj_step_per_s`: control steps'
+    worth of `mj_step` alone, on scripted actions, resets apart. `reset_ms`.
+  """
+  environment = lfgp_dmc.load(_TASK, seed=seed)
+  yield "control_steps_per_s", steps / _random_play(environment, steps, seed)
+  yield "mj_step_per_s", steps / _physics_alone(environment, steps, seed)
+  start = time.perf_counter()
+  for _ in range(_RESETS):
+    environment.reset()
+  yield "reset_ms", 1000 * (time.perf_counter() - start) / _RESETS
+  environment.close()
+
+
+def _random_play(environment, steps: int, seed: int) -> float:
+  """Seconds of `steps` control steps with random actions."""
+  random = np.random.default_rng(seed)
+  actions = random.uniform(-1, 1, (steps, 4)).astype(np.float32)
+  environment.reset()  # the first one compiles
+  start = time.perf_counter()
+  timestep = environment.reset()
+  for action in actions:
+    if timestep.last():
+      timestep = environment.reset()
+    timestep = environment.step(action)
+    lfgp_dmc.flatten(timestep.observation)
+  return time.perf_counter() - start
+
+
+def _physics_alone(environment, steps: int, seed: int) -> float:
+  """Seconds of the physics of `steps` control steps, replayed."""
+  import mujoco
+
+  from tasks import experts
+
+  expert = experts.make_expert()
+  model, data = environment.physics.model.ptr, environment.physics.data.ptr
+  signature = mujoco.mjtState.mjSTATE_INTEGRATION
+  state = np.empty(mujoco.mj_stateSize(model, signature))
+  substeps = round(environment.control_timestep() / model.opt.timestep)
+  seconds, done = 0.0, 0
+  while done < steps:
+    expert.begin(_TASK, seed + done)
+    timestep = environment.reset()
+    mujoco.mj_getState(model, data, state, signature)
+    controls = []
+    while not timestep.last() and done < steps:
+      action = expert.act(lfgp_dmc.flatten(timestep.observation))
+      timestep = environment.step(action)
+      controls.append(data.ctrl.copy())
+      done += 1
+    mujoco.mj_setState(model, data, state, signature)
+    mujoco.mj_forward(model, data)
+    start = time.perf_counter()
+    for control in controls:
+      data.ctrl[:] = control
+      mujoco.mj_step(model, data, substeps)
+    seconds += time.perf_counter() - start
+  return seconds

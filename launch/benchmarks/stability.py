@@ -1,0 +1,66 @@
+"""Does the physics hold: many random steps of every task."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import tqdm
+
+import lfgp_dmc
+from lfgp_dmc import environments, seeding
+
+COLUMNS = ("steps", "nan", "warnings", "blocks_out", "max_block_speed")
+
+
+def measure(
+  tasks: Sequence[str], steps: int, seed: int
+) -> Iterator[tuple[str, float]]:
+  """Plays uniform random actions.
+
+  Args:
+    tasks: in whose environments.
+    steps: control steps a task.
+    seed: of resets and actions.
+
+  Yields:
+    For each task and then in all: `steps`; `nan` (observations that are not
+    finite, and physics failures); `warnings` (MuJoCo's counters);
+    `blocks_out` (times that a block left the tray); `max_block_speed` (m/s);
+    those of a task as `steps/<task>` and so on.
+  """
+  totals = dict.fromkeys(COLUMNS, 0.0)
+  for task in tasks:
+    found = _play(task, steps, seed)
+    for name in COLUMNS:
+      yield f"{name}/{task}", found[name]
+      if name == "max_block_speed":
+        totals[name] = max(totals[name], found[name])
+      else:
+        totals[name] += found[name]
+  yield from totals.items()
+
+
+def _play(task: str, steps: int, seed: int) -> dict[str, float]:
+  environment = lfgp_dmc.load(
+    task, seed=seeding.derive(seed, "stability", task)
+  )
+  random = seeding.generator(seed, "stability actions", task)
+  nan = warnings = 0
+  speed = 0.0
+  timestep = environment.reset()
+  for step in tqdm.trange(steps, desc=task, unit="step", mininterval=1.0):
+    action = random.uniform(-1, 1, 4).astype(np.float32)
+    timestep = environment.step(action)
+    flat = lfgp_dmc.flatten(timestep.observation)
+    is_failure = environments.is_physics_failure(timestep)
+    nan += int(is_failure or not np.isfinite(flat).all())
+    velocity = timestep.observation["block_linear_velocities"].reshape(2, 3)
+    speed = max(speed, float(np.linalg.norm(velocity, axis=1).max()))
+    if timestep.last() or step == steps - 1:
+      # A reset clears MuJoCo's counters.
+      counters = environment.physics.data.warning
+      warnings += sum(int(counter.number) for counter in counters)
+      timestep = environment.reset()
+  blocks_out = environment.task.blocks_out
+  environment.close()
+  values = (steps, nan, warnings, blocks_out, speed)
+  return dict(zip(COLUMNS, map(float, values), strict=True))

@@ -1,0 +1,146 @@
+"""The whole way in minutes: collect, train, evaluate, draw, render.
+
+  python launch/demo.py --flagfile=launch/flags/quickstart.flags
+
+This is what `make demo` runs. It ends in one table of success (untrained and
+trained agent and the expert that it learned from, on the same resets), a figure
+and a video, in a new folder under runs/.
+"""
+
+import pathlib
+import time
+from collections.abc import Sequence
+
+import numpy as np
+from absl import flags
+
+from launch import actors, clips, command, config_flags, training, worlds
+from launch.configs import RunConfig
+from lfgp_dmc import (
+  evaluation,
+  figures,
+  graphics,
+  run_folder,
+  seeding,
+  task_names,
+  video,
+)
+from lfgp_dmc.evaluation import EvaluationRow
+
+_RUN = flags.DEFINE_string(
+  "run", "", "The run's folder; default: a new one under runs/."
+)
+_CLIPS = 3  # intentions shown in the video
+_EVERY = 2  # control steps a frame
+_RATE = 20.0  # control steps a second
+
+
+def main() -> int:
+  """Does everything, and says how long it took and where things are."""
+  start = time.monotonic()
+  with command.checked_input():
+    config = config_flags.resolved()
+  path = pathlib.Path(_RUN.value) if _RUN.value else _default_path(config)
+  print(f"training {config.algorithm} on {config.main_task} in {path}")
+  progress = training.train(config, path)
+  if progress.env_step < config.env_steps:
+    print(f"stopped at step {progress.env_step} of {config.env_steps}")
+    return command.INTERRUPTED
+  print("evaluating the scripted expert on the same resets", flush=True)
+  rows = evaluation.read_csv(path / "evaluation.csv")
+  expert = _evaluate_expert(config)
+  untrained = [row for row in rows if row.env_step == 0]
+  trained = [row for row in rows if row.env_step == progress.env_step]
+  figure = figures.learning_curve(
+    [path / "evaluation.csv"],
+    path / "learning_curve.png",
+    f"{config.algorithm} on {config.main_task}".replace("_", " "),
+  )
+  clip = _film(config, path, trained)
+  print(f"\n{table(config, untrained, trained, expert)}\n")
+  print(f"run folder      {path}")
+  print(f"demonstrations  {config.demonstrations}")
+  print(f"learning curve  {figure}")
+  print(f"video           {clip or graphics.fault()}")
+  print(f"total time      {(time.monotonic() - start) / 60:.1f} minutes")
+  return 0
+
+
+def table(
+  config: RunConfig,
+  untrained: Sequence[EvaluationRow],
+  trained: Sequence[EvaluationRow],
+  expert: Sequence[EvaluationRow],
+) -> str:
+  """Success by task, side by side."""
+  columns = [evaluation.success_rates(r) for r in (untrained, trained, expert)]
+  lines = [
+    f"success on the same {config.evaluation_episodes} resets of "
+    f"{config.main_task}, after {config.env_steps} environment steps",
+    f"{'task':<16}{'untrained':>11}{'trained':>11}{'expert':>11}",
+  ]
+  for task in columns[1]:
+    rates = (column.get(task, float("nan")) for column in columns)
+    cells = ("-" if np.isnan(rate) else f"{rate:.0%}" for rate in rates)
+    lines.append(f"{task:<16}" + "".join(f"{cell:>11}" for cell in cells))
+  return "\n".join(lines)
+
+
+def _default_path(config: RunConfig) -> pathlib.Path:
+  return run_folder.default_path("quickstart", config.main_task)
+
+
+def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
+  return evaluation.evaluate(
+    worlds.factory(config.environment, config.main_task, True),
+    actors.scripted_expert,
+    task_names.task_set(config.main_task),
+    config.evaluation_episodes,
+    config.evaluation_seed,
+    config.evaluation_workers or command.cores(),
+  )
+
+
+def _film(
+  config: RunConfig, path: pathlib.Path, trained: Sequence[EvaluationRow]
+) -> pathlib.Path | None:
+  """Renders evaluated episodes again: of the main task, then of others.
+
+  A success is shown where there was one.
+  """
+  if graphics.fault():
+    return None
+  best = {}
+  for row in sorted(trained, key=lambda row: not row.success):
+    best.setdefault(row.task, row)
+  chosen = sorted(
+    best.values(), key=lambda r: (r.task != config.main_task, not r.success)
+  )[:_CLIPS]
+  environment = worlds.build(config.environment, config.main_task)
+  actor = actors.stored_policy(str(path))
+  frames: list[np.ndarray] = []
+  for row in chosen:
+    seed = seeding.derive(row.seed, "evaluation", row.episode)
+    environment.reseed(seed)  # type: ignore[attr-defined]
+    clip = clips.record(
+      environment,
+      actor,
+      environment.reset(),
+      lambda step, timestep, task=row.task: task,
+      seed,
+      clips.Look(every=_EVERY),
+      max_steps=240,
+      until_success_of=row.task,
+    )
+    frames += clip.frames
+  shown = [{"task": row.task, "episode": row.episode} for row in chosen]
+  return video.write(
+    path / "video.mp4",
+    frames,
+    _RATE / _EVERY,
+    {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
+  )
+
+
+if __name__ == "__main__":
+  command.run(main, render=True, define_flags=config_flags.define)
