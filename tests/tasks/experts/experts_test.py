@@ -1,4 +1,4 @@
-"""Scripted experts: they succeed, from the observation alone, and look right."""
+"""Scripted experts succeed, from the observation alone, and look right."""
 
 import functools
 import pickle
