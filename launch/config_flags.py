@@ -15,19 +15,15 @@ from ml_collections import config_flags
 
 from launch import configs
 
-_PRESET = flags.DEFINE_string(
-  "preset",
-  "paper",
-  "Defaults of the config: paper (the paper's tables), ral (the authors' later "
-  "journal version) or fast (ours, provisional). --config.x=... overrides.",
-)
 
-
-def define(arguments: Sequence[str]) -> None:
-  """Defines `--config.*` for the algorithm and preset among the arguments.
+def define(
+  arguments: Sequence[str], flag_values: flags.FlagValues = flags.FLAGS
+) -> None:
+  """Defines `--preset`, and `--config.*` for the algorithm and preset asked.
 
   Args:
     arguments: of the command, with flagfiles expanded.
+    flag_values: where to define them.
 
   Raises:
     ValueError: an unknown algorithm or preset.
@@ -40,24 +36,36 @@ def define(arguments: Sequence[str]) -> None:
     name = _name(argument)
     if name.startswith("config.") and name[len("config.") :] not in known:
       raise ValueError(f"unknown --{name}; {_hint(name, known)}")
+  flags.DEFINE_string(
+    "preset",
+    "paper",
+    "Defaults of the config: paper (the paper's tables), ral (the authors' "
+    "later journal version) or fast (ours, provisional). --config.x=... "
+    "overrides.",
+    flag_values=flag_values,
+  )
   config_flags.DEFINE_config_dict(
     "config",
     defaults,
     "Settings of the run, as --config.NAME=VALUE; what they mean is said in "
     "launch/configs/run_config.py and agents/*/config.py. Now:\n"
     + "\n".join(f"--config.{name}={value}" for name, value in known.items()),
+    flag_values=flag_values,
+    sys_argv=[sys.argv[0], *arguments],
   )
   for name in ("config", "preset"):  # so that --help shows them
-    flags.FLAGS.register_key_flag_for_module(sys.argv[0], flags.FLAGS[name])
+    flag_values.register_key_flag_for_module(sys.argv[0], flag_values[name])
 
 
-def resolved() -> configs.RunConfig:
+def resolved(
+  flag_values: flags.FlagValues = flags.FLAGS,
+) -> configs.RunConfig:
   """The checked config of the parsed flags.
 
   Raises:
     ValueError: a value out of its range.
   """
-  return configs.to_run_config(flags.FLAGS.config)
+  return configs.to_run_config(flag_values.config)
 
 
 def is_given() -> bool:

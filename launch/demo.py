@@ -7,10 +7,12 @@ trained agent and the expert that it learned from, on the same resets), a figure
 and a video, in a new folder under runs/.
 """
 
+import functools
 import pathlib
 import time
 from collections.abc import Sequence
 
+import dm_env
 import numpy as np
 from absl import flags
 
@@ -110,7 +112,7 @@ def _film(
   """
   if graphics.fault():
     return None
-  best = {}
+  best: dict[str, EvaluationRow] = {}
   for row in sorted(trained, key=lambda row: not row.success):
     best.setdefault(row.task, row)
   chosen = sorted(
@@ -126,7 +128,7 @@ def _film(
       environment,
       actor,
       environment.reset(),
-      lambda step, timestep, task=row.task: task,
+      functools.partial(_one_task, row.task),
       seed,
       clips.Look(every=_EVERY),
       max_steps=240,
@@ -140,6 +142,10 @@ def _film(
     _RATE / _EVERY,
     {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
   )
+
+
+def _one_task(task: str, step: int, timestep: dm_env.TimeStep) -> str:
+  return task
 
 
 if __name__ == "__main__":

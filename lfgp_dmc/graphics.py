@@ -7,13 +7,15 @@ imports them first calls `choose_backend` before.
 
 import ctypes
 import ctypes.util
+import functools
 import os
 import sys
 
 BACKENDS = ("glfw", "egl", "osmesa", "off")
+# Mesa's EGL on Debian and Ubuntu; it needs no GPU.
+PACKAGES = ("libegl1", "libegl-mesa0", "libgl1-mesa-dri", "libgles2")
 INSTALL = (
-  "install Mesa's EGL (Debian, Ubuntu: apt-get install libegl1 libegl-mesa0 "
-  "libgl1-mesa-dri libgles2)"
+  f"install Mesa's EGL (Debian, Ubuntu: apt-get install {' '.join(PACKAGES)})"
 )
 
 _GL = "MUJOCO_GL"
@@ -52,7 +54,7 @@ def fault() -> str:
   chosen = os.environ.get(_GL, "").lower().strip()
   if chosen in _OFF:
     return f"no pictures: MUJOCO_GL is {chosen!r}; " + (
-      "unset it" if _egl_works() or _osmesa_works() else INSTALL
+      "unset it" if works_without_display() else INSTALL
     )
   if chosen not in ("", *BACKENDS):
     return f"MUJOCO_GL is {chosen!r}; valid: {', '.join(BACKENDS)}"
@@ -63,6 +65,11 @@ def fault() -> str:
   if chosen in ("", "glfw") and not has_display():
     return "MUJOCO_GL is 'glfw', but there is no display: unset it"
   return ""
+
+
+def works_without_display() -> bool:
+  """Whether EGL or OSMesa can make pictures here."""
+  return _egl_works() or _osmesa_works()
 
 
 def has_display() -> bool:
@@ -90,6 +97,7 @@ def _osmesa_works() -> bool:
   return ctypes.util.find_library("OSMesa") is not None
 
 
+@functools.cache
 def _egl_works() -> bool:
   """Whether a device (a GPU or Mesa's software) opens without a display."""
   try:
@@ -117,7 +125,7 @@ def _egl_works() -> bool:
     return False
   for device in devices[: count.value]:
     display = display_type(get_display)(_PLATFORM_DEVICE, device, None)
+    # Left open: MuJoCo will get the same display, and so may have already.
     if display and egl.eglInitialize(ctypes.c_void_p(display), None, None):
-      egl.eglTerminate(ctypes.c_void_p(display))
       return True
   return False

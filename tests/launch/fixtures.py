@@ -1,0 +1,70 @@
+"""Small datasets and configs for the tests of launch."""
+
+import dataclasses
+import pathlib
+
+import numpy as np
+
+from agents import synthetic
+from launch import configs
+from lfgp_dmc import demonstrations, toy
+
+POINT = "lfgp_dmc.toy:PointEnvironment"
+
+
+def write_dataset(
+  folder: pathlib.Path,
+  tasks=toy.TASKS,
+  observation_size: int = 2,
+  action_size: int = 2,
+  pairs: int = 60,
+) -> pathlib.Path:
+  """Writes made-up demonstrations; by default for the toy environment."""
+  folder.mkdir(parents=True)
+  made = synthetic.demonstrations(
+    tasks, pairs, observation_size, action_size, attempt=20
+  )
+  for task, data in made.items():
+    arrays = {f.name: getattr(data, f.name) for f in dataclasses.fields(data)}
+    arrays["action"] = np.clip(arrays["action"], -1, 1)
+    demonstrations.write(
+      folder / f"{task}.hdf5",
+      demonstrations.Demonstrations(**arrays),
+      {
+        "task": task,
+        "main_task": tasks[0],
+        "collection": "reset",
+        "expert": "synthetic",
+        "seed": 0,
+        "control_hz": 20,
+      },
+    )
+  return folder
+
+
+def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
+  """A run of the toy environment that takes a second or two."""
+  config = configs.make_config()
+  small = {
+    "agent.batch_size": 8,
+    "agent.discriminator_batch_size": 8,
+    "agent.episode_steps": 20,
+    "agent.hidden_size": 16,
+    "agent.random_steps": 20,
+    "agent.warm_up": 20,
+    "agent.xi": 5,
+    "checkpoint_every": 40,
+    "demonstrations": str(dataset),
+    "deterministic": True,
+    "device": "cpu",
+    "env_steps": 200,
+    "environment": POINT,
+    "evaluate_every": 100,
+    "evaluation_episodes": 2,
+    "evaluation_workers": 1,
+    "log_every": 20,
+    "main_task": "right",
+    "replay_capacity": 200,
+  }
+  config.update_from_flattened_dict({**small, **changes})
+  return configs.to_run_config(config)
