@@ -38,7 +38,7 @@ _TASKS = flags.DEFINE_list(
 )
 _SEED = flags.DEFINE_integer("seed", 0, "Of resets and actions.", lower_bound=0)
 _SECONDS = flags.DEFINE_float(
-  "seconds", 8.0, "Of each of the learner's measurements.", lower_bound=0.0
+  "seconds", 8.0, "Of each measurement of updates.", lower_bound=0.0
 )
 _OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
 
@@ -85,7 +85,7 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
     case "training":
       from launch.benchmarks import training
 
-      yield from training.measure(config, steps)
+      yield from training.measure(config, steps, _SECONDS.value)
     case "stability":
       from launch.benchmarks import stability
 

@@ -17,12 +17,15 @@ _ACTION_SIZE = 4
 _EPISODE = 360
 
 
-def measure(config: RunConfig, steps: int) -> Iterator[tuple[str, float]]:
+def measure(
+  config: RunConfig, steps: int, seconds: float
+) -> Iterator[tuple[str, float]]:
   """Trains for `steps` steps after one episode without updates.
 
   Args:
     config: of the run; demonstrations are made up.
     steps: environment steps with updates.
+    seconds: about how long the updates alone are measured.
 
   Yields:
     `loop_steps_per_s`: of the whole loop; `learner_updates_per_s`: of updates
@@ -53,5 +56,5 @@ def measure(config: RunConfig, steps: int) -> Iterator[tuple[str, float]]:
   start = time.perf_counter()
   train(_EPISODE + steps, progress)
   yield "loop_steps_per_s", steps / (time.perf_counter() - start)
-  yield "learner_updates_per_s", learner.rate(agent.update, 5.0)
+  yield "learner_updates_per_s", learner.rate(agent.update, seconds)
   environment.close()

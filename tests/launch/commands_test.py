@@ -1,0 +1,199 @@
+"""The commands as users call them: bad input, and a run from end to end."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+from concurrent import futures
+
+from absl.testing import absltest
+
+from launch import command, training
+from lfgp_dmc import evaluation, graphics, task_names, video
+from tests.launch import fixtures
+
+_ROOT = pathlib.Path(command.__file__).resolve().parents[1]
+_WITHOUT_DISPLAY = {
+  k: v
+  for k, v in os.environ.items()
+  if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
+}
+
+# Script, arguments, what the message says.
+_BAD = (
+  ("train.py --config.agent.sheduler=uniform", "did you mean --config.agent."),
+  ("train.py --flagfile=no.flags", "no.flags"),
+  ("train.py --config.seed=many", "flag --config.seed=many"),
+  ("train.py --resume", "--resume needs --run"),
+  ("train.py --resume --run=no/run", "no run folder no/run"),
+  ("train.py stack", "unexpected argument 'stack'"),
+  ("evaluate.py", "give one of --run=FOLDER and --expert=scripted"),
+  ("evaluate.py --run=no/run", "no run folder no/run"),
+  ("evaluate.py --expert=scripted --tasks=juggle", "unknown juggle; valid:"),
+  ("evaluate.py --expert=mine", "--expert=mine is unknown; valid: scripted"),
+  ("evaluate.py --expert=scripted --episodes=0", "valid: 1 or more"),
+  ("render_policy.py --expert=scripted --task=juggle", "valid: stack, "),
+  ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
+  ("view.py --task=juggle", "--task=juggle is unknown; valid: stack"),
+  ("view.py --task=stack", "the viewer needs a display"),
+  ("plot.py", "--runs is missing"),
+  ("plot.py --runs=no/run", "no run folder no/run"),
+  ("benchmark.py --what=luck", "--what=luck"),
+  ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
+  ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
+)
+
+
+def _call(line: str, folder: str) -> subprocess.CompletedProcess:
+  script, *arguments = line.split()
+  return subprocess.run(
+    [sys.executable, str(_ROOT / "launch" / script), *arguments],
+    cwd=folder,
+    env=_WITHOUT_DISPLAY,
+    capture_output=True,
+    text=True,
+    check=False,
+  )
+
+
+class BadInputTest(absltest.TestCase):
+  def test_is_told_in_a_line_and_leaves_nothing(self):
+    folder = self.create_tempdir().full_path
+    with futures.ThreadPoolExecutor(command.cores()) as pool:
+      calls = pool.map(lambda case: _call(case[0], folder), _BAD)
+      for (line, message), done in zip(_BAD, calls, strict=True):
+        with self.subTest(line):
+          self.assertEqual(done.returncode, 1, done.stderr)
+          self.assertIn(message, done.stderr)
+          self.assertNotIn("Traceback", done.stderr)
+    self.assertEmpty(os.listdir(folder))
+
+
+class BlockRunTest(absltest.TestCase):
+  """A tiny run of the block tasks, made once, and what is done with it."""
+
+  @classmethod
+  def setUpClass(cls):
+    super().setUpClass()
+    temporary = tempfile.TemporaryDirectory()
+    cls.addClassCleanup(temporary.cleanup)
+    cls.folder = pathlib.Path(temporary.name)
+    dataset = fixtures.write_dataset(
+      cls.folder / "data", task_names.task_set("bring"), 59, 4
+    )
+    changes = {
+      "agent.episode_steps": 360,
+      "agent.warm_up": 300,
+      "agent.xi": 45,
+      "env_steps": 400,
+      "environment": "",
+      "evaluate_every": 400,
+      "evaluation_episodes": 1,
+      "main_task": "bring",
+      "replay_capacity": 400,
+    }
+    cls.path = cls.folder / "runs" / "tiny"
+    config = fixtures.small_config(dataset, **changes)
+    training.train(config, cls.path, progress_bar=False)
+
+  def _call(self, line: str) -> subprocess.CompletedProcess:
+    return _call(line, str(self.folder))
+
+  def test_a_bare_resume_takes_the_runs_own_config(self):
+    done = self._call("train.py --run=runs/tiny --resume")
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertIn("success after 400 environment steps", done.stdout)
+    self.assertIn("policy       runs/tiny/policy.safetensors", done.stdout)
+
+  def test_evaluates_the_run_and_refuses_to_overwrite(self):
+    line = "evaluate.py --run=runs/tiny --episodes=2 --workers=1 --output=out"
+    done = self._call(line)
+    self.assertEqual(done.returncode, 0, done.stderr)
+    rows = evaluation.read_csv(self.folder / "out" / "evaluation.csv")
+    self.assertLen(rows, 2)
+    self.assertEqual({row.env_step for row in rows}, {400})
+    # Training evaluated the same reset with the same policy.
+    first = evaluation.read_csv(self.path / "evaluation.csv")[0]
+    self.assertEqual(rows[0], first)
+    done = self._call(line)
+    self.assertEqual(done.returncode, 1)
+    self.assertIn("exists; choose another --output", done.stderr)
+
+  def test_evaluates_the_expert(self):
+    done = self._call("evaluate.py --expert=scripted --tasks=reach "
+                      "--episodes=2 --workers=1 --output=expert")  # fmt: skip
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertRegex(done.stdout, r"reach +100.0% +2")
+
+  def test_plots(self):
+    done = self._call("plot.py --runs=runs/tiny --output=figures")
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertTrue((self.folder / "figures/lfgp_bring_success.png").exists())
+
+  def test_renders_intention_and_schedule_in_every_format(self):
+    if graphics.fault():
+      self.skipTest(graphics.fault())
+    size = "--height=64 --width=64 --steps=10 --every=5"
+    for suffix, task in zip(
+      video.FORMATS, ("reach", "scheduled", "bring"), strict=True
+    ):
+      done = self._call(f"render_policy.py --run=runs/tiny --task={task} "
+                        f"{size} --output=clip_{task}{suffix}")  # fmt: skip
+      self.assertEqual(done.returncode, 0, done.stderr)
+      self.assertGreater(
+        (self.folder / f"clip_{task}{suffix}").stat().st_size, 100
+      )
+      sidecar = json.loads((self.folder / f"clip_{task}.json").read_text())
+      self.assertEqual((sidecar["task"], sidecar["steps"]), (task, 10))
+
+  def test_renders_play_by_the_expert(self):
+    if graphics.fault():
+      self.skipTest(graphics.fault())
+    done = self._call("render_policy.py --expert=scripted --collection=play "
+                      "--height=64 --width=64 --every=20 "
+                      "--output=play.png")  # fmt: skip
+    self.assertEqual(done.returncode, 0, done.stderr)
+    sidecar = json.loads((self.folder / "play.json").read_text())
+    self.assertGreater(len(sidecar["intentions"]), 2)
+    self.assertNotIn("GLFW", done.stderr)
+
+  def test_benchmarks_print_the_agreed_lines(self):
+    with futures.ThreadPoolExecutor(command.cores()) as pool:
+      lines = (
+        "benchmark.py --what=environment --steps=50",
+        "benchmark.py --what=stability --steps=50 --tasks=reach",
+        "benchmark.py --what=training --steps=3 --config.agent.hidden_size=16",
+        "benchmark.py --what=learner --seconds=0 --config.agent.hidden_size=16",
+      )
+      calls = list(pool.map(self._call, lines))
+    names = [_names(done) for done in calls]
+    self.assertEqual(
+      names[0], ["control_steps_per_s", "mj_step_per_s", "reset_ms"]
+    )
+    self.assertContainsSubset(
+      ["steps", "nan", "warnings", "blocks_out", "max_block_speed"], names[1]
+    )
+    self.assertEqual(names[2], ["loop_steps_per_s", "learner_updates_per_s"])
+    self.assertContainsSubset(
+      [
+        "gflop_per_update",
+        "updates_per_s_fp32_1thread",
+        "updates_per_s_bf16_2threads",
+        "matmul_gflops_fp32_1thread",
+        "roofline_fraction_fp32_1thread",
+      ],
+      names[3],
+    )
+
+
+def _names(done: subprocess.CompletedProcess) -> list[str]:
+  assert not done.returncode, done.stderr
+  for line in done.stdout.splitlines():
+    float(line.partition("=")[2])
+  return [line.partition("=")[0] for line in done.stdout.splitlines()]
+
+
+if __name__ == "__main__":
+  absltest.main()
