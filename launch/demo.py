@@ -33,6 +33,7 @@ _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
 )
 _CLIPS = 3  # intentions shown in the video
+_MOST_STEPS = 160  # of each
 _EVERY = 2  # control steps a frame
 _RATE = 20.0  # control steps a second
 
@@ -112,12 +113,7 @@ def _film(
   """
   if graphics.fault():
     return None
-  best: dict[str, EvaluationRow] = {}
-  for row in sorted(trained, key=lambda row: not row.success):
-    best.setdefault(row.task, row)
-  chosen = sorted(
-    best.values(), key=lambda r: (r.task != config.main_task, not r.success)
-  )[:_CLIPS]
+  chosen = choose_episodes(config.main_task, trained)
   environment = worlds.build(config.environment, config.main_task)
   actor = actors.stored_policy(str(path))
   frames: list[np.ndarray] = []
@@ -131,7 +127,7 @@ def _film(
       functools.partial(_one_task, row.task),
       seed,
       clips.Look(every=_EVERY),
-      max_steps=240,
+      max_steps=_MOST_STEPS,
       until_success_of=row.task,
     )
     frames += clip.frames
@@ -142,6 +138,23 @@ def _film(
     _RATE / _EVERY,
     {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
   )
+
+
+def choose_episodes(
+  main_task: str, rows: Sequence[EvaluationRow]
+) -> list[EvaluationRow]:
+  """One episode of the main task and of a few others, successes if any.
+
+  The gripper tasks come last: there is least to see.
+  """
+  best: dict[str, EvaluationRow] = {}
+  for row in sorted(rows, key=lambda row: not row.success):
+    best.setdefault(row.task, row)
+
+  def rank(row: EvaluationRow) -> tuple:
+    return row.task != main_task, not row.success, "gripper" in row.task
+
+  return sorted(best.values(), key=rank)[:_CLIPS]
 
 
 def _one_task(task: str, step: int, timestep: dm_env.TimeStep) -> str:

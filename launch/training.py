@@ -1,11 +1,9 @@
 """One run from its config: environment, demonstrations, agent, loop, files."""
 
-import contextlib
 import functools
 import os
 import pathlib
 import shutil
-from collections.abc import Iterator
 
 import dm_env
 import safetensors.numpy
@@ -64,10 +62,18 @@ def train(
     widths = environments.widths(environment)
   shown = datasets.load(config, tasks, widths)
   print(f"demonstrations: {config.demonstrations}, {datasets.pairs(shown)}")
-  with _opened(config, path, resume) as run:
-    return _Run(config, run, environment, tasks, shown, device).train(
-      resume, progress_bar
-    )
+  with command.checked_input():
+    open_folder = run_folder.resume if resume else run_folder.create
+    folder = open_folder(path, config.to_dict())
+  try:
+    run = _Run(config, folder, environment, tasks, shown, device)
+    if resume:
+      run.restore()
+  except (ValueError, OSError) as error:
+    if not resume:  # it cannot start: as if it had not been tried
+      shutil.rmtree(path)
+    raise UserError(str(error)) from error
+  return run.train(progress_bar)
 
 
 def tasks_of(
@@ -161,29 +167,33 @@ class _Run:
       *widths,
     )
 
-  def train(self, resume: bool, progress_bar: bool) -> loop.Progress:
+    self._log = MetricsLog(run.path)
+    self._progress = loop.Progress()
+
+  def restore(self) -> None:
+    """Goes back to the last good checkpoint."""
+    self._progress = resuming.restore(
+      self._run, self._agent, self._replay, self._log
+    )
+
+  def train(self, progress_bar: bool) -> loop.Progress:
     """Runs the loop to its end or to a signal."""
-    config, run = self._config, self._run
     self._progress_bar = progress_bar
-    log = MetricsLog(run.path)
-    progress = None
-    if resume:
-      progress = resuming.restore(run, self._agent, self._replay, log)
-    self._save_policy(progress.env_step if progress else 0)
+    self._save_policy(self._progress.env_step)
     try:
       return loop.train(
         self._environment,
         self._agent,
         self._replay,
-        _schedule(config, progress_bar),
-        log,
+        _schedule(self._config, progress_bar),
+        self._log,
         self._evaluate,
         self._checkpoint,
-        seed=seeding.derive(config.seed, "environment"),
-        progress=progress,
+        seed=seeding.derive(self._config.seed, "environment"),
+        progress=self._progress,
       )
     finally:
-      log.close()
+      self._log.close()
       self._environment.close()
 
   def _evaluate(self, env_step: int) -> dict[str, float]:
@@ -222,20 +232,3 @@ def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
     evaluate_first=config.evaluate_first,
     progress_bar=progress_bar,
   )
-
-
-@contextlib.contextmanager
-def _opened(
-  config: RunConfig, path: pathlib.Path, resume: bool
-) -> Iterator[RunFolder]:
-  """The run's folder; one made for a run that cannot start is removed."""
-  with command.checked_input():
-    open_folder = run_folder.resume if resume else run_folder.create
-    run = open_folder(path, config.to_dict())
-  try:
-    yield run
-  except ValueError as error:
-    if not resume and not run.metrics.exists():
-      shutil.rmtree(path)
-      raise UserError(str(error)) from error
-    raise
