@@ -84,7 +84,7 @@ def _insert_held(view: View, away: float) -> Command:
 
 def _park_blue(view: View) -> Command:
   """Sets blue down flat, away from green and from the slots."""
-  y = ws.CENTRE_XY[1] + math.copysign(0.08, ws.CENTRE_XY[1] - view.green.y)
+  y = ws.CENTRE_XY[1] + math.copysign(0.05, ws.CENTRE_XY[1] - view.green.y)
   return place.set_down(view, view.blue, (0.0, y))
 
 

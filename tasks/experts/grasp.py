@@ -22,7 +22,10 @@ _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
 _MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
-_SQUARE = math.radians(0.9)  # a block is square to the fingers
+_SWEPT = 0.10  # m from the middle along y, where a sweep outwards ends
+_SWEPT_BACK = 0.06  # m likewise, where a sweep inwards ends
+_AT_FINGER = 0.012  # m, TCP beside a block that is at one finger
+_ASKEW = math.radians(1.4)
 _OPENING = 0.02  # change of the opening in a step of fingers that open
 
 
@@ -95,14 +98,15 @@ def grasp(view: View, target: BlockView, square: bool = False) -> Command:
   Args:
     view: the observation.
     target: the block.
-    square: whether to turn a block parallel to the fingers first: closing
-      alone aligns it to 10 degrees, and not at all beyond 35.
+    square: whether to turn it parallel to the fingers first: closing alone
+      aligns a block to 10 degrees, and not at all beyond 35.
   """
-  askew = square and target.tilt < 0.1 and abs(target.yaw) > _SQUARE
+  square = square and target.tilt < 0.1
   is_letting_go = view.opening_rate > _OPENING
   if is_between_fingers(view, target) and not is_letting_go:
-    if askew and view.opening > 0.75:
-      return _turn(view, target)
+    side = _sweeping_side(view, target) if square else 0.0
+    if side and view.opening > 0.92:
+      return _sweep(view, target, side)
     if _is_centred(view, target):
       goal = (
         target.x,
@@ -124,27 +128,31 @@ def _is_centred(view: View, target: BlockView) -> bool:
   )
 
 
-def _turn(view: View, target: BlockView) -> Command:
+def _sweep(view: View, target: BlockView, side: float) -> Command:
   """Pushes a block along y with one open finger, whose face squares it."""
   goal = (
     target.x,
-    view.set_point[1] + 0.02 * _turning_side(view, target),
+    view.set_point[1] + 0.02 * side,
     max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
   )
-  return Command(motion.servo(view, goal, speed=0.6), OPEN, noise=0.6)
+  return Command(motion.servo(view, goal, speed=0.75), OPEN, noise=0.6)
 
 
-def _turning_side(view: View, target: BlockView) -> float:
-  """Which way along y: on as begun, else to the middle, away from green."""
-  dy = view.tcp[1] - target.y
-  if abs(dy) > 0.005:
-    return math.copysign(1.0, dy)
-  other = view.other(target)
-  side = 1.0 if target.y < ws.CENTRE_XY[1] else -1.0
-  ahead = side * (other.y - target.y)
-  if abs(other.x - target.x) < 0.045 and 0.0 < ahead < 0.10:
-    return -side
-  return side
+def _sweeping_side(view: View, target: BlockView) -> float:
+  """Which way along y to sweep a block; 0: it is where sweeps end.
+
+  Where the block is decides, as that is easier to see, and to imitate, than
+  a degree of yaw: outwards until it is 10 cm from the middle. Only a block
+  that is askew even there is swept back in, to be swept out again.
+  """
+  off_middle = target.y - ws.CENTRE_XY[1]
+  outwards = math.copysign(1.0, off_middle)
+  is_at_inner_finger = -outwards * (view.tcp[1] - target.y) > _AT_FINGER
+  if abs(off_middle) > _SWEPT:
+    return -outwards if abs(target.yaw) > _ASKEW else 0.0
+  if is_at_inner_finger and abs(off_middle) > _SWEPT_BACK:
+    return -outwards
+  return outwards
 
 
 def push_free(view: View, target: BlockView) -> Command:
