@@ -33,7 +33,7 @@ class TrainSchedule:
   warmup_steps: int = 1_000  # transitions in the replay before the first update
   random_steps: int = 0  # actions drawn uniformly from [-1, 1]
   updates_per_step: float = 1.0  # below 1: an update every few steps
-  evaluate_first: bool = False  # also before the first step
+  evaluate_first: bool = False  # also before the first step, once prepared
   progress_bar: bool = True
 
   def __post_init__(self):
@@ -131,6 +131,7 @@ class _Loop:
   ) -> None:
     """Plays episodes; evaluates and checkpoints between them."""
     schedule, progress = self._schedule, self.progress
+    self._agent.prepare(schedule.progress_bar)
     self._bar = tqdm.tqdm(
       total=schedule.env_steps,
       initial=progress.env_step,

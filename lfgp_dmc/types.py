@@ -42,6 +42,9 @@ class Agent(Protocol):
 
   tasks: tuple[str, ...]
 
+  def prepare(self, progress_bar: bool) -> None:
+    """Work before a new run's first step, such as a warm start; once."""
+
   def begin_episode(self) -> None:
     """Called after each reset, before the first action."""
 

@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 import torch
-from absl import logging
+import tqdm
 
 from agents import serialisation
 from agents.cloning import IntentionCloner
@@ -26,7 +26,7 @@ from agents.schedulers import Scheduler, make_scheduler, period_returns
 from lfgp_dmc import seeding
 from lfgp_dmc.types import Episode, Metrics, Transition
 
-_CLONING_LOG_EVERY = 1000  # updates of the warm start between log lines
+_CLONING_LOG_EVERY = 1000  # updates of the warm start between readings of the loss
 
 
 class Replay(Protocol):
@@ -96,10 +96,18 @@ class LfgpAgent:
     """The task whose intention acts now."""
     return self._task
 
-  def begin_episode(self) -> None:
-    """Starts an episode; before the first one, makes the warm start."""
+  def prepare(self, progress_bar: bool = False) -> None:
+    """Makes the warm start by behaviour cloning, if any is due.
+
+    Args:
+      progress_bar: whether to show its updates' rate and time left.
+    """
     if not self._has_started:
-      self._warm_start()
+      self._warm_start(progress_bar)
+      self._has_started = True
+
+  def begin_episode(self) -> None:
+    """Starts an episode."""
     self._episode_step = 0
     self._scheduler.begin_episode()
 
@@ -220,7 +228,7 @@ class LfgpAgent:
     expert = self._experts.sample_transitions(self._sampling, expert_rows)
     return Batch(*map(torch.cat, zip(batch, expert, strict=True)))
 
-  def _warm_start(self) -> None:
+  def _warm_start(self, progress_bar: bool) -> None:
     """Pure behaviour cloning; then the critics start from its trunk."""
     config = self._config
     cloner = IntentionCloner(
@@ -230,16 +238,22 @@ class LfgpAgent:
       config.max_gradient_norm,
       config.bfloat16,
     )
-    for update in range(1, config.bc_warm_start_updates + 1):
+    updates = tqdm.trange(
+      1,
+      config.bc_warm_start_updates + 1,
+      desc="warm start",
+      unit="update",
+      disable=not progress_bar,
+    )
+    for update in updates:
       metrics = cloner.update(
         self._experts.sample(self._sampling, config.batch_size)
       )
       if update % _CLONING_LOG_EVERY == 0:
         loss = float(metrics["loss/behaviour_cloning"])
-        logging.info("warm start, update %d: loss %.4f", update, loss)
+        updates.set_postfix(loss=f"{loss:.4f}")
     if config.actor_trunk == "shared":
       self._learner.adopt_intention_trunk()
-    self._has_started = True
 
 
 def build(

@@ -112,7 +112,7 @@ class LearningTest(absltest.TestCase):
     before = np.square(
       agent.policy.act(part.observation, "reach") - part.action
     )
-    agent.begin_episode()
+    agent.prepare()
     after = np.square(agent.policy.act(part.observation, "reach") - part.action)
     self.assertLess(after.mean(), 0.2 * before.mean())
     networks = agent._learner.networks

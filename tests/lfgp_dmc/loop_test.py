@@ -21,11 +21,16 @@ class _Agent:
   def __init__(self, on_act=None):
     self.random = np.random.default_rng(0)
     self.updates = 0
-    self.begun = 0
+    self.prepared = self.begun = 0
     self.episodes = []
     self.on_act = on_act
 
+  def prepare(self, progress_bar):
+    assert not self.begun
+    self.prepared += 1
+
   def begin_episode(self):
+    assert self.prepared == 1
     self.begun += 1
 
   def act(self, observation):

@@ -40,6 +40,9 @@ class _Agent:
     self._acts = 0
     self._die_at = die_at
 
+  def prepare(self, progress_bar):
+    pass
+
   def begin_episode(self):
     pass
 
