@@ -32,6 +32,8 @@ from lfgp_dmc.evaluation import EvaluationRow
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
 )
+_HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
+_WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
 _CLIPS = 3  # intentions shown in the video
 _MOST_STEPS = 160  # of each
 _EVERY = 2  # control steps a frame
@@ -126,7 +128,7 @@ def _film(
       environment.reset(),
       functools.partial(_one_task, row.task),
       seed,
-      clips.Look(every=_EVERY),
+      clips.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_STEPS,
       until_success_of=row.task,
     )

@@ -59,6 +59,8 @@ def _open(cast: actors.Cast | None, task: str) -> None:
         actor.begin(task, _SEED.value)
       return actor.act(flatten(timestep.observation))
 
+  print("space starts and pauses, backspace resets, [ and ] change the camera,")
+  print("F1 shows all keys")
   viewer.launch(environment, policy, title=f"LfGP-DMC: {task}")
 
 

@@ -13,7 +13,13 @@ import sys
 
 BACKENDS = ("glfw", "egl", "osmesa", "off")
 # Mesa's EGL on Debian and Ubuntu; it needs no GPU.
-PACKAGES = ("libegl1", "libegl-mesa0", "libgl1-mesa-dri", "libgles2")
+PACKAGES = (
+  "libegl1",
+  "libegl-mesa0",
+  "libgl1-mesa-dri",
+  "libgles2",
+  "libopengl0",
+)
 INSTALL = (
   f"install Mesa's EGL (Debian, Ubuntu: apt-get install {' '.join(PACKAGES)})"
 )

@@ -71,6 +71,26 @@ class BadInputTest(absltest.TestCase):
     self.assertEmpty(os.listdir(folder))
 
 
+class DemoTest(absltest.TestCase):
+  def test_collects_trains_and_leaves_table_figure_and_video(self):
+    folder = pathlib.Path(self.create_tempdir().full_path)
+    flagfile = _ROOT / "launch" / "flags" / "quickstart.flags"
+    done = _call(
+      f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
+      "--config.collect_pairs=40 --config.env_steps=360 "
+      "--config.evaluate_every=360 --config.evaluation_episodes=1 "
+      "--config.evaluation_workers=1 --config.agent.batch_size=8 "
+      "--config.agent.bc_warm_start_updates=5",
+      str(folder),
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertRegex(done.stdout, r"task +untrained +trained +expert\nbring")
+    self.assertIn("total time", done.stdout)
+    self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
+    if not graphics.fault():
+      self.assertTrue((folder / "runs/demo/video.mp4").exists())
+
+
 class BlockRunTest(absltest.TestCase):
   """A tiny run of the block tasks, made once, and what is done with it."""
 
