@@ -9,8 +9,8 @@ from tasks.experts.view import BlockView, View, across, is_held
 
 _BROUGHT = 0.026  # m, horizontally, of a block that may stay
 _DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
-_IN_MOUTH_Z = ws.INSERTED_Z + 0.0068  # m, of an upright block that will drop
-_IN_SLOT_Z = ws.INSERTED_Z + 0.0045  # m, of any block that will drop in
+_IN_MOUTH_Z = ws.INSERTED_Z + 0.0045  # m, of an upright block that will drop
+_IN_SLOT_Z = ws.INSERTED_Z + 0.003  # m, of any block that will drop in
 _SEATED_Z = ws.INSERTED_Z + 0.002  # m
 _TILTED = math.radians(3.0)
 _JAMMED = math.radians(3.8)
@@ -56,7 +56,7 @@ def insert(view: View) -> Command:
     return _insert_held(view, away)
   if away < 0.0025 and blue.z < _SEATED_Z:
     return place.leave(view, blue)
-  if away < 0.0025 and blue.z < _IN_MOUTH_Z + 0.002 and blue.tilt < _TOPPLED:
+  if away < 0.0025 and blue.z < _IN_MOUTH_Z + 0.004 and blue.tilt < _TOPPLED:
     return _press(view)
   if _is_in_the_way(view.green):
     return grasp.grasp(view, view.green)
@@ -77,8 +77,8 @@ def _insert_held(view: View, away: float) -> Command:
   # One edge went in and the other did not, or it is gripped too low.
   if blue.tilt > _JAMMED or across(view, blue)[2] < _LEAST_GRIP:
     return _park_blue(view)
-  to = (*ws.BLUE_XY, ws.INSERTED_Z + 0.003)
-  move = place.carry(view, blue, to, narrow=0.0006, slope=5.0, gain=0.25)
+  to = (*ws.BLUE_XY, ws.INSERTED_Z + 0.001)
+  move = place.carry(view, blue, to, narrow=0.0003, slope=8.0, gain=0.35)
   return Command(move, CLOSE, noise=0.25 if away < 0.006 else 0.6)
 
 

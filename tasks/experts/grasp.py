@@ -15,7 +15,7 @@ from tasks.experts.view import (
   is_between_fingers,
 )
 
-GRIP_HEIGHT = 0.006  # m, TCP above the centre of a gripped block
+GRIP_HEIGHT = 0.009  # m, TCP above the centre of a gripped block
 HOVER = 0.050  # m, TCP above the centre of the highest block on the way
 
 _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
