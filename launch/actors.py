@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 import lfgp_dmc
+from launch import worlds
 from launch.command import UserError
 from lfgp_dmc import run_folder
 from lfgp_dmc.types import Actor
@@ -78,15 +79,17 @@ def _of_folder(folder: str) -> Cast:
     if not (path / _ARRAYS).is_file():
       raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
     policy: Any = stored_policy(folder)
+    main_task = config.get("main_task", policy.tasks[0])
+    environment = config.get("environment", "")
+    worlds.check(environment, main_task)
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
-  main_task = config.get("main_task", policy.tasks[0])
   return Cast(
     functools.partial(stored_policy, os.fspath(path)),
     path.name,
     main_task,
     (main_task, *(t for t in policy.tasks if t != main_task)),
-    config.get("environment", ""),
+    environment,
     path,
     config,
     int(config.get("policy", {}).get("env_step", 0)),

@@ -7,7 +7,7 @@ import dm_env
 import numpy as np
 
 import lfgp_dmc
-from launch import actors, configs
+from launch import actors
 from launch.clips import Switch
 from launch.command import UserError
 from lfgp_dmc import checkpoints, environments, run_folder, seeding
@@ -97,6 +97,7 @@ def _scheduled(cast: actors.Cast, seed: int) -> Switch:
   if cast.folder is None or "agent" not in cast.config:
     raise UserError("--task=scheduled needs the folder of a whole run")
   from agents.schedulers import make_scheduler
+  from launch import configs  # imports torch, which only this needs
 
   stored = {
     name: value

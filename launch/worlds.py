@@ -9,6 +9,7 @@ import dm_env
 
 import lfgp_dmc
 from lfgp_dmc.observations import SUCCESS_PREFIX
+from lfgp_dmc.task_names import check_task
 
 _REWARD = "reward/"
 
@@ -48,6 +49,14 @@ def build(
       if name.startswith(_REWARD):
         observable.enabled = True
   return built
+
+
+def check(environment: str, main_task: str) -> None:
+  """Raises ValueError unless `build` would find what it needs."""
+  if environment:
+    _imported(environment)
+  else:
+    check_task(main_task)
 
 
 def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:

@@ -10,7 +10,7 @@ from concurrent import futures
 
 from absl.testing import absltest
 
-from launch import command, training
+from launch import actors, command, training
 from lfgp_dmc import evaluation, graphics, task_names, video
 from tests.launch import fixtures
 
@@ -28,7 +28,7 @@ _BAD = (
   ("train.py --config.seed=many", "flag --config.seed=many"),
   ("train.py --resume", "--resume needs --run"),
   ("train.py --resume --run=no/run", "no run folder no/run"),
-  ("train.py stack", "unexpected argument 'stack'"),
+  ("evaluate.py stack", "unexpected argument 'stack'"),
   ("evaluate.py", "give one of --run=FOLDER and --expert=scripted"),
   ("evaluate.py --run=no/run", "no run folder no/run"),
   ("evaluate.py --expert=scripted --tasks=juggle", "unknown juggle; valid:"),
@@ -40,7 +40,6 @@ _BAD = (
   ("view.py --task=stack", "the viewer needs a display"),
   ("plot.py", "--runs is missing"),
   ("plot.py --runs=no/run", "no run folder no/run"),
-  ("benchmark.py --what=luck", "--what=luck"),
   ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )
@@ -146,6 +145,22 @@ class BlockRunTest(absltest.TestCase):
                       "--episodes=2 --workers=1 --output=expert")  # fmt: skip
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(done.stdout, r"reach +100.0% +2")
+
+  def test_a_policy_of_an_unknown_world_is_refused(self):
+    policy = self.folder / "policy"
+    policy.mkdir()
+    arrays = (self.path / "policy.safetensors").read_bytes()
+    (policy / "policy.safetensors").write_bytes(arrays)
+    stored = json.loads((self.path / "config.json").read_text())
+    for change, message in (
+      ({"environment": "no.such:thing"}, "No module named 'no'"),
+      ({"main_task": "juggle"}, "unknown task 'juggle'; valid tasks: stack"),
+      ({"policy": {}}, "valid: a list of task names"),
+    ):
+      text = json.dumps({**stored, **change})
+      (policy / "config.json").write_text(text)
+      with self.assertRaisesRegex(command.UserError, message):
+        actors.find("", str(policy))
 
   def test_plots(self):
     done = self._call("plot.py --runs=runs/tiny --output=figures")
