@@ -30,7 +30,7 @@ _EXPERT = flags.DEFINE_string(
   "expert", "scripted", "scripted, or the folder of a run or policy."
 )
 _WORKERS = flags.DEFINE_integer(
-  "workers", None, "Processes; default: one a core. The data are the same."
+  "workers", 0, "Processes; 0: one a core. The data are the same."
 )
 
 _CONTROL_HZ = 20  # what `lfgp_dmc.load` builds
@@ -90,8 +90,7 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
   command.check_least("seed", _SEED.value, 0)
-  if _WORKERS.value is not None:
-    command.check_least("workers", _WORKERS.value, 1)
+  command.check_least("workers", _WORKERS.value, 0)
   valid = lfgp_dmc.task_set(_TASK.value)
   tasks = list(dict.fromkeys(_TASKS.value or valid))
   for task in tasks:
@@ -104,6 +103,10 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
       f"--output={output} exists; valid: a new folder (datasets are never "
       "written into)"
     )
+  # Better now than after minutes of collecting.
+  output.parent.mkdir(parents=True, exist_ok=True)
+  if not os.access(output.parent, os.W_OK):
+    raise command.UserError(f"--output={output}: cannot write there")
   return output, tasks
 
 
@@ -115,7 +118,6 @@ def _write(
   output: pathlib.Path, found: dict[str, collection.Collected]
 ) -> None:
   """Writes the dataset aside, then gives it its name: whole or not at all."""
-  output.parent.mkdir(parents=True, exist_ok=True)
   prefix = f".{output.name}.partial."
   with tempfile.TemporaryDirectory(prefix=prefix, dir=output.parent) as aside:
     folder = demonstrations.create_folder(pathlib.Path(aside) / output.name)
