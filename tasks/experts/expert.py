@@ -13,6 +13,7 @@ NOISE = 0.1  # standard deviation of the action noise, in units of the action
 
 _NOISY_FROM = 0.4  # |a| from which the noise is in full
 _LEAST_NOISE = 0.25  # share of the noise at rest
+_MOST_NOISE = 1.5  # of all factors together
 _GRIP = (0.3, 1.0)  # magnitude of gripper commands
 
 POLICIES: dict[str, Callable[[View], Command]] = {
@@ -71,7 +72,7 @@ class ScriptedExpert:
     move = np.array(command.move)
     busy = min(float(np.abs(move).max()) / _NOISY_FROM, 1.0)
     share = _LEAST_NOISE + (1.0 - _LEAST_NOISE) * busy
-    scale = self._noise * command.noise * share
+    scale = self._noise * min(command.noise * share, _MOST_NOISE)
     action = np.empty(4, np.float32)
     action[:3] = move + scale * self._random.standard_normal(3)
     action[3] = command.grip * self._random.uniform(*_GRIP)
