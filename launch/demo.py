@@ -2,15 +2,17 @@
 
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
-This is what `make demo` runs. It ends in one table of success (untrained and
-trained agent and the expert that it learned from, on the same resets), a figure
-and a video, in a new folder under runs/.
+This is what `make demo` runs. It ends in one table of success on the same
+resets (untrained agent, its warm start by behaviour cloning, trained agent, and
+the expert that it learned from), a figure and a video, in a new folder under
+runs/.
 """
 
 import functools
 import pathlib
+import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import dm_env
 import numpy as np
@@ -51,20 +53,26 @@ def main() -> int:
   if progress.env_step < config.env_steps:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
-  print("evaluating the scripted expert on the same resets", flush=True)
   rows = evaluation.read_csv(path / "evaluation.csv")
-  expert = _evaluate_expert(config)
-  untrained = [row for row in rows if row.env_step == 0]
   trained = [row for row in rows if row.env_step == progress.env_step]
+  columns = {
+    "untrained": _evaluate_untrained(config),
+    "warm start": [row for row in rows if row.env_step == 0],
+    "trained": trained,
+    "expert": _evaluate_expert(config),
+  }
   figure = figures.learning_curve(
     [path / "evaluation.csv"],
     path / "learning_curve.png",
     f"{config.algorithm} on {config.main_task}".replace("_", " "),
   )
   clip = _film(config, path, trained)
-  print(f"\n{table(config, untrained, trained, expert)}\n")
+  shown = table(config, columns)
+  (path / "success.txt").write_text(shown + "\n")
+  print(f"\n{shown}\n")
   print(f"run folder      {path}")
   print(f"demonstrations  {config.demonstrations}")
+  print(f"success table   {path / 'success.txt'}")
   print(f"learning curve  {figure}")
   print(f"video           {clip or graphics.fault()}")
   print(f"total time      {(time.monotonic() - start) / 60:.1f} minutes")
@@ -72,22 +80,21 @@ def main() -> int:
 
 
 def table(
-  config: RunConfig,
-  untrained: Sequence[EvaluationRow],
-  trained: Sequence[EvaluationRow],
-  expert: Sequence[EvaluationRow],
+  config: RunConfig, columns: Mapping[str, Sequence[EvaluationRow]]
 ) -> str:
-  """Success by task, side by side."""
-  columns = [evaluation.success_rates(r) for r in (untrained, trained, expert)]
+  """Success by task, the columns side by side."""
+  rates = {
+    name: evaluation.success_rates(list(rows)) for name, rows in columns.items()
+  }
   lines = [
     f"success on the same {config.evaluation_episodes} resets of "
     f"{config.main_task}, after {config.env_steps} environment steps",
-    f"{'task':<16}{'untrained':>11}{'trained':>11}{'expert':>11}",
+    f"{'task':<16}" + "".join(f"{name:>12}" for name in rates),
   ]
-  for task in columns[1]:
-    rates = (column.get(task, float("nan")) for column in columns)
-    cells = ("-" if np.isnan(rate) else f"{rate:.0%}" for rate in rates)
-    lines.append(f"{task:<16}" + "".join(f"{cell:>11}" for cell in cells))
+  for task in rates["trained"]:
+    values = (column.get(task) for column in rates.values())
+    cells = ("-" if value is None else f"{value:.0%}" for value in values)
+    lines.append(f"{task:<16}" + "".join(f"{cell:>12}" for cell in cells))
   return "\n".join(lines)
 
 
@@ -95,10 +102,22 @@ def _default_path(config: RunConfig) -> pathlib.Path:
   return run_folder.default_path("quickstart", config.main_task)
 
 
+def _evaluate_untrained(config: RunConfig) -> list[EvaluationRow]:
+  print("evaluating the untrained agent on the same resets", flush=True)
+  with tempfile.TemporaryDirectory() as folder:
+    training.write_untrained_policy(config, pathlib.Path(folder))
+    return _evaluate(config, functools.partial(actors.stored_policy, folder))
+
+
 def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
+  print("evaluating the scripted expert on the same resets", flush=True)
+  return _evaluate(config, actors.scripted_expert)
+
+
+def _evaluate(config: RunConfig, make_actor) -> list[EvaluationRow]:
   return evaluation.evaluate(
     worlds.factory(config.environment, config.main_task, True),
-    actors.scripted_expert,
+    make_actor,
     task_names.task_set(config.main_task),
     config.evaluation_episodes,
     config.evaluation_seed,

@@ -133,6 +133,23 @@ def evaluate_policy(
   )
 
 
+def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
+  """Stores the policy of this config's agent before it learns anything.
+
+  Args:
+    config: of a run whose demonstrations are there.
+    folder: an existing folder.
+  """
+  device = set_up_torch(config)
+  environment = worlds.build(config.environment, config.main_task)
+  tasks = tasks_of(config, environment)
+  widths = environments.widths(environment)
+  environment.close()
+  shown = datasets.load(config, tasks, widths)
+  agent = _build_agent(config, tasks, shown, Replay(1, *widths), device, widths)
+  _write_policy(folder, config, agent, env_step=0)
+
+
 class _Run:
   """The parts of one run, put together."""
 
@@ -157,16 +174,9 @@ class _Run:
       run.replay,
       slack=config.checkpoint_every + 2 * episode if is_ring else 0,
     )
-    self._agent = ALGORITHMS[config.algorithm].build(
-      config.agent,
-      tasks,
-      shown,
-      self._replay,
-      seeding.derive(config.seed, "agent"),
-      device,
-      *widths,
+    self._agent = _build_agent(
+      config, tasks, shown, self._replay, device, widths
     )
-
     self._log = MetricsLog(run.path)
     self._progress = loop.Progress()
 
@@ -211,14 +221,31 @@ class _Run:
     )
 
   def _save_policy(self, env_step: int) -> None:
-    """Makes the run's folder a policy folder of the present policy."""
-    path = self._run.path / _ARRAYS
-    with files.replacing(path) as aside:
-      safetensors.numpy.save_file(self._agent.policy_arrays(), aside)
-    options = {**self._agent.policy_options(), "env_step": env_step}
-    files.write_json(
-      self._run.config, {**self._config.to_dict(), "policy": options}
-    )
+    _write_policy(self._run.path, self._config, self._agent, env_step)
+
+
+def _build_agent(config, tasks, shown, replay, device, widths):
+  return ALGORITHMS[config.algorithm].build(
+    config.agent,
+    tasks,
+    shown,
+    replay,
+    seeding.derive(config.seed, "agent"),
+    device,
+    *widths,
+  )
+
+
+def _write_policy(
+  folder: pathlib.Path, config: RunConfig, agent, env_step: int
+) -> None:
+  """Makes a folder the policy folder of the agent's present policy."""
+  with files.replacing(folder / _ARRAYS) as aside:
+    safetensors.numpy.save_file(agent.policy_arrays(), aside)
+  options = {**agent.policy_options(), "env_step": env_step}
+  files.write_json(
+    folder / run_folder.CONFIG_NAME, {**config.to_dict(), "policy": options}
+  )
 
 
 def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:

@@ -26,7 +26,7 @@ from agents.schedulers import Scheduler, make_scheduler, period_returns
 from lfgp_dmc import seeding
 from lfgp_dmc.types import Episode, Metrics, Transition
 
-_CLONING_LOG_EVERY = 1000  # updates of the warm start between readings of the loss
+_CLONING_LOG_EVERY = 1000  # warm-start updates between readings of its loss
 
 
 class Replay(Protocol):
