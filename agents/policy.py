@@ -12,12 +12,9 @@ import safetensors.numpy
 import torch
 
 from agents import serialisation
-from agents.networks.intentions import (
-  IntentionHeads,
-  IntentionNetwork,
-  to_deviation,
-)
-from agents.networks.trunk import Standardiser, Trunk
+from agents.networks import layouts
+from agents.networks.intentions import IntentionNetwork, to_deviation
+from agents.networks.trunk import Standardiser
 
 ARRAYS_FILE = "policy.safetensors"
 CONFIG_FILE = "config.json"
@@ -62,7 +59,8 @@ class Policy:
     Args:
       arrays: name -> array.
       options: `tasks` (list of str), `observation_size`, `action_size`,
-        `hidden_size` (int): an agent's `policy_options`.
+        `hidden_size` (int), `layout` (of `networks/layouts.py`; missing: a
+        shared trunk): an agent's `policy_options`.
 
     Returns:
       The policy, on the CPU.
@@ -79,6 +77,11 @@ class Policy:
     tasks = options.get("tasks")
     if not isinstance(tasks, list | tuple) or not tasks:
       faults.append(f"tasks is {tasks!r}; valid: a list of task names")
+    layout = options.get("layout", layouts.SHARED_TRUNK)
+    if layout not in layouts.LAYOUTS:
+      faults.append(
+        f"layout is {layout!r}; valid: {', '.join(layouts.LAYOUTS)}"
+      )
     if faults:
       raise ValueError(f"policy options: {'; '.join(faults)}")
     assert tasks is not None
@@ -86,8 +89,10 @@ class Policy:
     generator = torch.Generator()
     network = IntentionNetwork(
       Standardiser(observations),
-      Trunk(observations, hidden, generator),
-      IntentionHeads(len(tasks), hidden, hidden, actions, generator),
+      layouts.make_trunk(layout, observations, hidden, generator),
+      layouts.make_intention_heads(
+        layout, len(tasks), observations, hidden, actions, generator
+      ),
       owns_trunk=True,
     )
     serialisation.load_module_state(network, arrays, "policy arrays")
@@ -146,12 +151,13 @@ class Policy:
 
   def options(self) -> dict[str, Any]:
     """The JSON-able options that `from_arrays` takes beside the arrays."""
-    first = self._network.trunk.first
+    network = self._network
     return {
       "tasks": list(self.tasks),
-      "observation_size": first.in_features,
+      "observation_size": network.standardiser.mean.shape[0],
       "action_size": self.action_size,
-      "hidden_size": first.out_features,
+      "hidden_size": network.heads.output.weight.shape[1],
+      "layout": layouts.layout_of(network.heads),
     }
 
   @property

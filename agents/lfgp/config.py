@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from agents import rewards, schedulers
-from agents.networks import discriminator
+from agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
 
@@ -22,6 +22,7 @@ class LfgpConfig:
 
   # Networks.
   hidden_size: int = 256
+  layout: str = layouts.SHARED_TRUNK  # "separate": each head its own (DAC)
   actor_trunk: str = "shared"  # "own": a second trunk, trained by the policy
   critic_layer_norm: bool = False
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
@@ -172,6 +173,7 @@ _RANGES: dict[str, tuple[Callable[[Any], bool], str]] = {
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,
   "discriminator_input": discriminator.INPUTS,
+  "layout": layouts.LAYOUTS,
   "reward": tuple(rewards.VARIANTS),
   "scheduler": schedulers.NAMES,
 }

@@ -7,10 +7,11 @@ import torch
 from torch import nn
 
 from agents.lfgp.config import LfgpConfig
-from agents.networks.critics import CriticNetwork, TwinCriticHeads
+from agents.networks import layouts
+from agents.networks.critics import CriticNetwork
 from agents.networks.discriminator import Discriminator
-from agents.networks.intentions import IntentionHeads, IntentionNetwork
-from agents.networks.trunk import Standardiser, Trunk
+from agents.networks.intentions import IntentionNetwork
+from agents.networks.trunk import Standardiser
 
 
 @dataclasses.dataclass
@@ -57,19 +58,23 @@ def make_networks(
     The networks. The intentions own their trunk if the config says so, or if
     a warm start by behaviour cloning has to train it.
   """
-  hidden = config.hidden_size
-  trunk = Trunk(observations, hidden, generator)
+  layout, hidden = config.layout, config.hidden_size
+  sizes = (tasks, observations, hidden, actions)
+  trunk = layouts.make_trunk(layout, observations, hidden, generator)
   critics = CriticNetwork(
     trunk,
-    TwinCriticHeads(
-      tasks, hidden, hidden, actions, generator, config.critic_layer_norm
+    layouts.make_critic_heads(
+      layout, *sizes, generator, config.critic_layer_norm
     ),
   ).to(device)
   owns_trunk = config.actor_trunk == "own" or config.bc_warm_start_updates > 0
+  own = trunk
+  if owns_trunk:
+    own = layouts.make_trunk(layout, observations, hidden, generator)
   intentions = IntentionNetwork(
     standardiser,
-    Trunk(observations, hidden, generator) if owns_trunk else trunk,
-    IntentionHeads(tasks, hidden, hidden, actions, generator),
+    own,
+    layouts.make_intention_heads(layout, *sizes, generator),
     owns_trunk,
   ).to(device)
   discriminator = Discriminator(

@@ -5,11 +5,10 @@ from torch import nn
 from torch.nn import functional
 
 from agents.networks.linear import StackedLinear, initialise_
-from agents.networks.trunk import Trunk
 
 
 class TwinCriticHeads(nn.Module):
-  """2K heads [features, action] -> H ReLU -> 1.
+  """2K heads [features, action] -> H ReLU (once or twice) -> 1.
 
   The first layer is kept in two parts, for features and for actions, so that
   the derivative by the action alone costs no product with the features' part.
@@ -23,17 +22,19 @@ class TwinCriticHeads(nn.Module):
     actions: int,
     generator: torch.Generator,
     layer_norm: bool = False,
+    hidden_layers: int = 1,
   ):
     """Draws all heads.
 
     Args:
       tasks: K.
       features: outputs of the trunk.
-      hidden: H, units of the hidden layer.
+      hidden: H, units of a hidden layer.
       actions: A.
       generator: source of the initial numbers.
-      layer_norm: normalise the hidden layer before its ReLU, with a gain and
-        a bias for each head (not in the paper).
+      layer_norm: normalise the last hidden layer before its ReLU, with a gain
+        and a bias for each head (not in the paper).
+      hidden_layers: 1 or 2.
     """
     super().__init__()
     self.tasks = tasks
@@ -43,6 +44,9 @@ class TwinCriticHeads(nn.Module):
     self.bias = nn.Parameter(torch.empty(groups, 1, hidden))
     for parameter in (self.feature_weight, self.action_weight, self.bias):
       initialise_(parameter, fan_in, generator)
+    self.second = None
+    if hidden_layers == 2:
+      self.second = StackedLinear(groups, hidden, hidden, generator)
     self.output = StackedLinear(groups, hidden, 1, generator)
     self.gain = self.shift = None
     if layer_norm:
@@ -55,7 +59,7 @@ class TwinCriticHeads(nn.Module):
     """Both values of each task for that task's action.
 
     Args:
-      features: [B, H], the same rows in every task.
+      features: [B, features], the same rows in every task.
       action: [B, A] for the same action in every task, or [K, B, A].
 
     Returns:
@@ -70,6 +74,8 @@ class TwinCriticHeads(nn.Module):
     hidden = torch.baddbmm(
       hidden, action.expand(groups, rows, action.shape[-1]), self.action_weight
     )
+    if self.second is not None:
+      hidden = self.second(torch.relu(hidden))
     if self.gain is not None and self.shift is not None:
       hidden = functional.layer_norm(hidden, hidden.shape[-1:])
       hidden = hidden * self.gain + self.shift
@@ -80,11 +86,11 @@ class TwinCriticHeads(nn.Module):
 class CriticNetwork(nn.Module):
   """Trunk and twin heads: the target network is a copy of the whole."""
 
-  def __init__(self, trunk: Trunk, heads: TwinCriticHeads):
+  def __init__(self, trunk: nn.Module, heads: TwinCriticHeads):
     """Puts the parts together.
 
     Args:
-      trunk: inputs [B, O] -> features [B, H].
+      trunk: inputs [B, O] -> features; see `layouts.py`.
       heads: features and actions -> values.
     """
     super().__init__()

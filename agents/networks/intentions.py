@@ -5,13 +5,13 @@ from torch import nn
 from torch.nn import functional
 
 from agents.networks.linear import StackedLinear
-from agents.networks.trunk import Standardiser, Trunk
+from agents.networks.trunk import Standardiser
 
 DEVIATION_FLOOR = 1e-7  # the paper's epsilon against underflow
 
 
 class IntentionHeads(nn.Module):
-  """K heads H -> H ReLU -> 2A: the mean and raw deviation of a Gaussian."""
+  """K heads -> H ReLU (once or twice) -> 2A: mean and raw deviation."""
 
   def __init__(
     self,
@@ -20,18 +20,23 @@ class IntentionHeads(nn.Module):
     hidden: int,
     actions: int,
     generator: torch.Generator,
+    hidden_layers: int = 1,
   ):
     """Draws all heads.
 
     Args:
       tasks: K.
       features: outputs of the trunk.
-      hidden: H, units of the hidden layer.
+      hidden: H, units of a hidden layer.
       actions: A.
       generator: source of the initial numbers.
+      hidden_layers: 1 or 2.
     """
     super().__init__()
     self.hidden = StackedLinear(tasks, features, hidden, generator)
+    self.second = None
+    if hidden_layers == 2:
+      self.second = StackedLinear(tasks, hidden, hidden, generator)
     self.output = StackedLinear(tasks, hidden, 2 * actions, generator)
 
   def forward(
@@ -45,14 +50,19 @@ class IntentionHeads(nn.Module):
     Returns:
       Mean and standard deviation, float32 [K, B, A] each.
     """
-    return split(self.output(torch.relu(self.hidden(features))))
+    hidden = torch.relu(self.hidden(features))
+    if self.second is not None:
+      hidden = torch.relu(self.second(hidden))
+    return split(self.output(hidden))
 
   def one(
     self, features: torch.Tensor, task: int
   ) -> tuple[torch.Tensor, torch.Tensor]:
     """One task's Gaussian for features [B, H]: mean, raw deviation [B, A]."""
-    output = self.output.one(torch.relu(self.hidden.one(features, task)), task)
-    mean, raw = output.chunk(2, dim=-1)
+    hidden = torch.relu(self.hidden.one(features, task))
+    if self.second is not None:
+      hidden = torch.relu(self.second.one(hidden, task))
+    mean, raw = self.output.one(hidden, task).chunk(2, dim=-1)
     return mean, raw
 
 
@@ -73,7 +83,7 @@ class IntentionNetwork(nn.Module):
   def __init__(
     self,
     standardiser: Standardiser,
-    trunk: Trunk,
+    trunk: nn.Module,
     heads: IntentionHeads,
     owns_trunk: bool,
   ):
@@ -81,7 +91,7 @@ class IntentionNetwork(nn.Module):
 
     Args:
       standardiser: raw observation -> input.
-      trunk: input -> features.
+      trunk: input -> features; see `layouts.py`.
       heads: features -> Gaussians.
       owns_trunk: whether losses of the intentions train the trunk. False: it
         is the critics', and no gradient of ours reaches it.

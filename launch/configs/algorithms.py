@@ -39,4 +39,11 @@ ALGORITHMS: dict[str, Algorithm] = {
     lfgp.build,
     defaults={"scheduler": "main_only"},
   ),
+  "dac": Algorithm(
+    "Discriminator-Actor-Critic: the main task alone, separate networks",
+    LfgpConfig,
+    lfgp.build,
+    defaults={"scheduler": "main_only", "layout": "separate"},
+    is_multitask=False,
+  ),
 }
