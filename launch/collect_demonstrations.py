@@ -24,6 +24,12 @@ _COLLECTION = flags.DEFINE_string(
   "collection", "reset", "reset (before each attempt) or play (none between)."
 )
 _PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.")
+_FINALS = flags.DEFINE_integer(
+  "final_pairs",
+  0,
+  "Extra pairs a task: the row of success of so many further attempts. The "
+  "journal version's 1000 pairs: --pairs_per_task=800 --final_pairs=200.",
+)
 _SEED = flags.DEFINE_integer("seed", 0, "Everything random follows from it.")
 _OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
 _EXPERT = flags.DEFINE_string(
@@ -70,6 +76,7 @@ def main() -> int:
       tasks,
       _PAIRS.value,
       workers=_WORKERS.value or command.cores(),
+      finals=_FINALS.value,
     )
   except collection.NoSuccessError as error:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
@@ -89,6 +96,7 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
   command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
+  command.check_least("final_pairs", _FINALS.value, 0)
   command.check_least("seed", _SEED.value, 0)
   command.check_least("workers", _WORKERS.value, 0)
   valid = lfgp_dmc.task_set(_TASK.value)

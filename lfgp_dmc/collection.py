@@ -44,8 +44,9 @@ def collect(
   pairs: int,
   workers: int = 1,
   progress: bool = True,
+  finals: int = 0,
 ) -> dict[str, Collected]:
-  """Collects exactly `pairs` pairs of each task.
+  """Collects exactly `pairs` pairs of each task, and `finals` on top.
 
   Args:
     plan: environments, actor, T_all and seed.
@@ -55,6 +56,8 @@ def collect(
       have no `is_last`.
     workers: processes.
     progress: whether to show a progress bar.
+    finals: extra pairs a task, each the row of success of a further attempt
+      and an episode of its own (the authors' later journal version).
 
   Returns:
     Task -> its pairs; the same whatever the number of workers.
@@ -72,9 +75,9 @@ def collect(
       raise ValueError(
         f"{task!r} is not a task of T_all: {', '.join(plan.tasks)}"
       )
-  piles = {task: _Pile(task, pairs) for task in tasks}
+  piles = {task: _Pile(task, pairs, finals) for task in tasks}
   with tqdm.tqdm(
-    total=pairs * len(piles), unit="pair", disable=not progress
+    total=(pairs + finals) * len(piles), unit="pair", disable=not progress
   ) as bar:
     if collection == "play":
       bar.set_description("play")
@@ -135,15 +138,15 @@ class _OpenUnits:
 class _Pile:
   """The pairs of one task so far."""
 
-  def __init__(self, task: str, pairs: int):
-    self._task, self._pairs = task, pairs
+  def __init__(self, task: str, pairs: int, finals: int):
+    self._task, self._pairs, self._wanted = task, pairs, pairs + finals
     self._rows: list[Rows] = []
     self._stored = self._attempts = self._failures = 0
 
   @property
   def is_full(self) -> bool:
     """Are there as many pairs as wanted."""
-    return self._stored >= self._pairs
+    return self._stored >= self._wanted
 
   def add(self, attempt: Attempt) -> int:
     """Takes an attempt in, unless full; returns how many pairs it added.
@@ -159,17 +162,21 @@ class _Pile:
       if self._failures >= _MOST_FAILURES:
         raise NoSuccessError(
           f"{self._task}: {self._failures} attempts in a row failed; "
-          f"{self._stored} of {self._pairs} pairs collected"
+          f"{self._stored} of {self._wanted} pairs collected"
         )
       return 0
     self._failures = 0
-    self._rows.append(attempt.rows)
     before = self._stored
-    self._stored = min(before + len(attempt.rows.action), self._pairs)
+    if before < self._pairs:
+      self._rows.append(attempt.rows)
+      self._stored = min(before + len(attempt.rows.action), self._pairs)
+    else:
+      self._rows.append(Rows(*(part[-1:] for part in attempt.rows)))
+      self._stored += 1
     return self._stored - before
 
   def collected(self) -> Collected:
-    """The pairs, cut at exactly the number wanted."""
+    """The pairs, the attempt that fills them cut; then the extra finals."""
     lengths = [len(rows.action) for rows in self._rows]
     is_last = np.zeros(sum(lengths), np.bool_)
     is_last[np.cumsum(lengths) - 1] = True
@@ -177,7 +184,11 @@ class _Pile:
     observation, action, next_observation = (
       np.concatenate(parts) for parts in zip(*self._rows, strict=True)
     )
-    whole = Demonstrations(
-      observation, action, next_observation, episode, is_last
+    finals = self._wanted - self._pairs
+    kept = np.r_[: self._pairs, len(action) - finals : len(action)]
+    arrays = (observation, action, next_observation, episode, is_last)
+    return Collected(
+      Demonstrations(*(array[kept] for array in arrays)),
+      self._attempts,
+      len(self._rows),
     )
-    return Collected(whole.head(self._pairs), self._attempts, len(self._rows))

@@ -87,6 +87,24 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
   return np.asarray(rewards, np.float32)
 
 
+def tasks_with_rewards(
+  environment: dm_env.Environment, tasks: Sequence[str]
+) -> tuple[str, ...]:
+  """All tasks whose reward the environment shows, or else `tasks`.
+
+  A replay that keeps the rewards of all of them can be carried over to any
+  of these tasks without a simulator.
+  """
+  spec = environment.observation_spec()
+  names = spec if isinstance(spec, Mapping) else ()
+  shown = [
+    name.removeprefix(REWARD_PREFIX)
+    for name in names
+    if name.startswith(REWARD_PREFIX)
+  ]
+  return (*tasks, *(task for task in shown if task not in tasks))
+
+
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:
   """Whether `task` has succeeded; None if the environment cannot tell."""
   shown = timestep.observation

@@ -192,9 +192,8 @@ class _Loop:
       self._agent.end_episode(_episode(rows))
 
   def _rewards(self, timestep: dm_env.TimeStep) -> np.ndarray | None:
-    if not self._replay.has_rewards:
-      return None
-    return environments.task_rewards(timestep, self._agent.tasks)
+    tasks = self._replay.reward_tasks
+    return environments.task_rewards(timestep, tasks) if tasks else None
 
   def _drop_episode(self, rows: int) -> None:
     """Withdraws what was stored; updates made meanwhile may have seen it."""

@@ -9,13 +9,15 @@ without losing the rows that its own had displaced.
 
 import os
 import pathlib
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from lfgp_dmc import files
 from lfgp_dmc.types import Transition
 
-_SIDECAR = "replay.json"
+SIDECAR = "replay.json"
 _CHUNK = 16_384  # rows of disk taken at a time
 
 
@@ -29,7 +31,7 @@ class Replay:
     action_size: int,
     folder: files.Path | None = None,
     *,
-    reward_size: int = 0,
+    reward_tasks: Sequence[str] = (),
     slack: int = 0,
   ):
     """Makes an empty replay, or opens the one that `folder` holds.
@@ -40,7 +42,8 @@ class Replay:
       action_size: A.
       folder: where the arrays are mapped (sparse npy files that take disk
         only as they fill); None keeps them in memory.
-      reward_size: K of the optional column of rewards; 0 leaves it out.
+      reward_tasks: whose dense rewards are kept beside each row, in an
+        optional column; none leave it out.
       slack: rows kept intact beyond the capacity; at least the rows added
         between two checkpoints where a full ring must resume exactly.
 
@@ -56,8 +59,9 @@ class Replay:
       "action": action_size,
       "next_observation": observation_size,
     }
-    if reward_size:
-      self._widths["rewards"] = reward_size
+    self._reward_tasks = tuple(reward_tasks)
+    if reward_tasks:
+      self._widths["rewards"] = len(reward_tasks)
     self._folder = None if folder is None else pathlib.Path(folder)
     self._total = 0  # rows ever added, less those withdrawn
     self._written = 0  # the most rows ever added: later ones overwrote
@@ -86,9 +90,9 @@ class Replay:
     return self._total
 
   @property
-  def has_rewards(self) -> bool:
-    """Whether the optional column of rewards is kept."""
-    return self._rewards is not None
+  def reward_tasks(self) -> tuple[str, ...]:
+    """The tasks whose rewards are kept, in their order; may be none."""
+    return self._reward_tasks
 
   @property
   def _start(self) -> int:
@@ -98,7 +102,7 @@ class Replay:
   def add(
     self, transition: Transition, rewards: np.ndarray | None = None
   ) -> None:
-    """Appends one transition; `rewards` [K] if the replay keeps them.
+    """Appends one transition; `rewards`: one of each of `reward_tasks`.
 
     Raises:
       OSError: the disk is full; the row is not added.
@@ -185,9 +189,9 @@ class Replay:
     )
 
   def gather_rewards(self, indices: np.ndarray) -> np.ndarray:
-    """Copies the rewards of rows out: float32 [B, K]."""
+    """Copies the rewards of rows out: float32 [B, `reward_tasks`]."""
     if self._rewards is None:
-      raise ValueError("this replay keeps no rewards (reward_size=0)")
+      raise ValueError("this replay keeps no rewards (reward_tasks is empty)")
     return self._rewards.take(self._rows(indices), axis=0)
 
   def flush(self) -> None:
@@ -196,7 +200,7 @@ class Replay:
       return
     for mapped in self._mapped:
       mapped.flush()
-    files.write_json(self._folder / _SIDECAR, self._description())
+    files.write_json(self._folder / SIDECAR, self._description())
 
   def _rows(self, indices: np.ndarray) -> np.ndarray:
     return (np.asarray(indices) + self._start) % self._size
@@ -235,25 +239,32 @@ class Replay:
     self._mapped.append(mapped)
     return np.asarray(mapped)  # plain indexing is faster than memmap's
 
-  def _description(self) -> dict[str, int]:
+  def _description(self) -> dict[str, Any]:
     return {
       "total": self._total,
       "written": self._written,
       "capacity": self._capacity,
       "size": self._size,
+      "reward_tasks": list(self._reward_tasks),
     }
 
   def _open_sidecar(self) -> None:
     assert self._folder is not None
-    path = self._folder / _SIDECAR
+    path = self._folder / SIDECAR
     if not path.exists():
       return
     found = files.read_json(path)
     try:
       capacity, size = found["capacity"], found["size"]
       self._total, self._written = found["total"], found["written"]
+      reward_tasks = tuple(found.get("reward_tasks", ()))
     except (KeyError, TypeError):
       raise ValueError(f"{os.fspath(path)} is damaged: {found!r}") from None
+    if reward_tasks != self._reward_tasks:
+      raise ValueError(
+        f"{path}: a replay with rewards of {list(reward_tasks)}; expected "
+        f"{list(self._reward_tasks)}"
+      )
     if (capacity, size) != (self._capacity, self._size):
       raise ValueError(
         f"{path}: a replay of capacity {capacity} (with slack {size}); "

@@ -75,4 +75,4 @@ class Episode(NamedTuple):
 
   observation: np.ndarray  # float32 [T, O]
   action: np.ndarray  # float32 [T, A]
-  rewards: np.ndarray | None = None  # float32 [T, K] if the replay keeps them
+  rewards: np.ndarray | None = None  # float32 [T, R] if the replay keeps them

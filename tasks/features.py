@@ -4,13 +4,13 @@ Entities hand out MJCF elements; this file resolves them to addresses once,
 after compilation, so that a step costs a few array reads.
 """
 
-import itertools
 import math
 
 import numpy as np
 from dm_control import mjcf
 
 from lfgp_dmc.observations import OBSERVATION_SIZE
+from lfgp_dmc.rotations import reduce_rotation
 from tasks import workspace as ws
 from tasks.entities import Block, Panda, Tray
 from tasks.entities.panda_links import FINGER_TRAVEL
@@ -21,57 +21,6 @@ _TORQUE_SCALE = 10.0  # N m
 
 # Bits of the contact table: who a geom belongs to.
 _BLUE, _GREEN, _TRAY, _ROBOT = 1, 2, 4, 8
-
-
-def _cube_rotations() -> np.ndarray:
-  """The cube's 24 rotations as unit quaternions w x y z, float [24, 4].
-
-  They are the 24 units of the binary octahedral group up to sign: the axes,
-  the sums of two axes and the sums of all four, normalised.
-  """
-  found: list[tuple[float, ...]] = []
-  for count in (1, 2, 4):
-    for axes in itertools.combinations(range(4), count):
-      for signs in itertools.product((1.0, -1.0), repeat=count - 1):
-        quat = np.zeros(4)
-        quat[list(axes)] = (1.0, *signs)
-        found.append(tuple(quat / np.linalg.norm(quat)))
-  return np.array(found)
-
-
-def _left_matrix(quat) -> np.ndarray:
-  """L with L p = quat * p (Hamilton product), float [4, 4]."""
-  w, x, y, z = quat
-  return np.array(
-    [[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]
-  )
-
-
-def _right_matrix(quat) -> np.ndarray:
-  """R with R p = p * quat (Hamilton product), float [4, 4]."""
-  w, x, y, z = quat
-  return np.array(
-    [[w, -x, -y, -z], [x, w, z, -y], [y, -z, w, x], [z, y, -x, w]]
-  )
-
-
-# [24, 4, 4]: applied to a quaternion, all equal-looking ones of a cube.
-_SYMMETRIES = np.stack([_right_matrix(quat) for quat in _cube_rotations()])
-
-
-def reduce_rotation(quat: np.ndarray) -> np.ndarray:
-  """The equal-looking rotation of a cube with the smallest angle.
-
-  Args:
-    quat: unit quaternion w x y z, float [4].
-
-  Returns:
-    float [4], w > 0; among ties the cube rotation of the lowest index.
-  """
-  candidates = _SYMMETRIES @ quat
-  # Rounded, so that a tie is a tie and not the last bit's toss-up.
-  best = candidates[np.argmax(np.abs(candidates[:, 0]).round(9))]
-  return best if best[0] >= 0 else -best
 
 
 class FeatureReader:

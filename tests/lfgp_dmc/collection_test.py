@@ -91,6 +91,23 @@ class CollectTest(parameterized.TestCase):
     np.testing.assert_array_equal(cut.action, exact.action[:-1])
 
   @parameterized.parameters("reset", "play")
+  def test_extra_finals_are_rows_of_success_of_further_attempts(self, kind):
+    plain = _collect(_plan(), kind, pairs=20)
+    found = collection.collect(
+      _plan(), kind, toy.TASKS, 20, progress=False, finals=7
+    )
+    for task in toy.TASKS:
+      data = found[task].demonstrations
+      self.assertLen(data, 27)
+      for name, array in plain[task].demonstrations.arrays().items():
+        np.testing.assert_array_equal(data.arrays()[name][:20], array)
+      self.assertTrue(data.is_last[20:].all())
+      self.assertTrue((np.diff(data.episode[19:]) > 0).all())
+      side = 1 if task == "right" else -1
+      reached = side * data.next_observation[20:, 0]
+      self.assertTrue((reached > 0.6).all())
+
+  @parameterized.parameters("reset", "play")
   def test_only_successes_are_kept(self, kind):
     found = _collect(_plan(), kind, ("right",), pairs=200)
     data = found["right"].demonstrations

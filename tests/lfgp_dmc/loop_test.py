@@ -64,7 +64,7 @@ class LoopTest(absltest.TestCase):
       "warmup_steps": 10,
       "progress_bar": False,
     } | schedule
-    self._replay = Replay(1000, 2, 2, reward_size=2)
+    self._replay = Replay(1000, 2, 2, reward_tasks=toy.TASKS)
     return loop.train(
       environment or toy.PointEnvironment(),
       agent,

@@ -96,8 +96,8 @@ class ReplayTest(parameterized.TestCase):
       replay.withdraw(1)
 
   def test_rewards_are_kept_beside(self):
-    replay = Replay(4, 3, 2, reward_size=2)
-    self.assertTrue(replay.has_rewards)
+    replay = Replay(4, 3, 2, reward_tasks=("lift", "reach"))
+    self.assertEqual(replay.reward_tasks, ("lift", "reach"))
     replay.add(_transition(0), np.array([1, 2]))
     replay.add(_transition(1), np.array([3, 4]))
     np.testing.assert_array_equal(
