@@ -4,15 +4,10 @@ Episode i starts from a reset that depends on (seed, i) alone: not on the task,
 the method, the episodes before it, or how many processes share the work.
 """
 
-import concurrent.futures
 import contextlib
 import functools
 import inspect
-import multiprocessing
-import os
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import dm_env
@@ -20,6 +15,7 @@ import tqdm
 from absl import logging
 
 from lfgp_dmc import environments, seeding
+from lfgp_dmc import workers as work
 from lfgp_dmc.evaluation_files import (
   EvaluationRow,
   append_csv,
@@ -30,16 +26,6 @@ from lfgp_dmc.evaluation_files import (
   write_csv,
 )
 from lfgp_dmc.types import Actor
-
-# What a worker must find set before it imports anything.
-_WORKER_VARIABLES = {
-  "OMP_NUM_THREADS": "1",
-  "MKL_NUM_THREADS": "1",
-  "OPENBLAS_NUM_THREADS": "1",
-  "OMP_WAIT_POLICY": "PASSIVE",
-  "MUJOCO_GL": "off",
-}
-
 
 __all__ = [
   "EvaluationRow",
@@ -83,32 +69,20 @@ def evaluate(
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
-  arguments = (make_environment, make_actor, seed, env_step)
-  bar = functools.partial(
-    tqdm.tqdm,
+  make_player = functools.partial(
+    _Player, make_environment, make_actor, seed, env_step
+  )
+  results = work.ordered(make_player, jobs, workers)
+  bar = tqdm.tqdm(
+    results,
     total=len(jobs),
     desc="evaluating",
     unit="episode",
     disable=not progress,
     leave=False,
   )
-  if workers == 1:
-    player = _Player(*arguments)
-    try:
-      return list(bar(map(player.play, jobs)))
-    finally:
-      player.close()
-  with _worker_variables():
-    pool = concurrent.futures.ProcessPoolExecutor(
-      workers,
-      mp_context=multiprocessing.get_context("spawn"),
-      initializer=_start_worker,
-      initargs=arguments,
-    )
-    try:
-      return list(bar(pool.map(_play_in_worker, jobs)))
-    finally:
-      pool.shutdown(cancel_futures=True)
+  with contextlib.closing(results):
+    return list(bar)
 
 
 class _Player:
@@ -122,7 +96,7 @@ class _Player:
     self._flatten = environments.flattener(self._environment)
     self._actor: Actor = make_actor()
 
-  def play(self, job: tuple[str, int]) -> EvaluationRow:
+  def __call__(self, job: tuple[str, int]) -> EvaluationRow:
     """Plays one whole episode; success never ends it."""
     task, episode = job
     self._prepare(seeding.derive(self._seed, "evaluation", episode))
@@ -168,45 +142,3 @@ def _takes_seed(factory: Callable[..., Any]) -> bool:
     return "seed" in inspect.signature(factory).parameters
   except (TypeError, ValueError):  # a builtin without a signature
     return False
-
-
-_player: _Player | None = None  # one in each worker process
-
-
-def _start_worker(*arguments) -> None:
-  global _player
-  signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
-  threading.Thread(target=_end_with_parent, daemon=True).start()
-  _player = _Player(*arguments)
-
-
-def _end_with_parent() -> None:
-  """Ends this worker when its parent is gone, however that was killed."""
-  parent = multiprocessing.parent_process()
-  assert parent is not None
-  parent.join()
-  os._exit(1)
-
-
-def _play_in_worker(job: tuple[str, int]) -> EvaluationRow:
-  assert _player is not None
-  return _player.play(job)
-
-
-@contextlib.contextmanager
-def _worker_variables() -> Iterator[None]:
-  """Sets the variables that spawned processes inherit, then restores ours.
-
-  They must be there before a worker's first import, which an initializer
-  would come too late for: unpickling its arguments already imports.
-  """
-  before = {name: os.environ.get(name) for name in _WORKER_VARIABLES}
-  os.environ.update(_WORKER_VARIABLES)
-  try:
-    yield
-  finally:
-    for name, value in before.items():
-      if value is None:
-        del os.environ[name]
-      else:
-        os.environ[name] = value

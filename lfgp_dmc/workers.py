@@ -33,8 +33,9 @@ def ordered(
   """Yields the result of each job, in order.
 
   Args:
-    make_state: called once in each process; returns what does a job. With
-      several workers it must be picklable, and so must jobs and results.
+    make_state: called once in each process; returns what does a job, and may
+      have a `close`. With several workers it must be picklable, and so must
+      jobs and results.
     jobs: finite or endless.
     workers: processes; 1 works in this one.
 
@@ -42,7 +43,12 @@ def ordered(
     `make_state()(job)` for each job.
   """
   if workers == 1:
-    yield from map(make_state(), jobs)
+    state = make_state()
+    try:
+      yield from map(state, jobs)
+    finally:
+      if hasattr(state, "close"):
+        state.close()
     return
   jobs = iter(jobs)
   with _variables():

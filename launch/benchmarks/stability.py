@@ -8,6 +8,8 @@ import tqdm
 import lfgp_dmc
 from lfgp_dmc import environments, seeding
 
+_HELD = 0.1  # chance of a new action, in every other episode
+
 COLUMNS = ("steps", "nan", "warnings", "blocks_out", "max_block_speed")
 
 
@@ -15,6 +17,9 @@ def measure(
   tasks: Sequence[str], steps: int, seed: int
 ) -> Iterator[tuple[str, float]]:
   """Plays uniform random actions.
+
+  In every other episode each is held for ten steps on average, so that the
+  hand gets about and rams what it meets.
 
   Args:
     tasks: in whose environments.
@@ -47,8 +52,10 @@ def _play(task: str, steps: int, seed: int) -> dict[str, float]:
   nan = warnings = 0
   speed = 0.0
   timestep = environment.reset()
+  action, change = np.zeros(4, np.float32), 1.0
   for step in tqdm.trange(steps, desc=task, unit="step", mininterval=1.0):
-    action = random.uniform(-1, 1, 4).astype(np.float32)
+    if random.random() < change:
+      action = random.uniform(-1, 1, 4).astype(np.float32)
     timestep = environment.step(action)
     flat = lfgp_dmc.flatten(timestep.observation)
     is_failure = environments.is_physics_failure(timestep)
@@ -60,6 +67,7 @@ def _play(task: str, steps: int, seed: int) -> dict[str, float]:
       counters = environment.physics.data.warning
       warnings += sum(int(counter.number) for counter in counters)
       timestep = environment.reset()
+      change = _HELD if change == 1.0 else 1.0
   blocks_out = environment.task.blocks_out
   environment.close()
   values = (steps, nan, warnings, blocks_out, speed)
