@@ -1,10 +1,10 @@
 """Every setting of the LfGP agent, checked when it is made."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from agents import rewards, schedulers
+from agents import field_checks, rewards, schedulers
 from agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
@@ -75,17 +75,7 @@ class LfgpConfig:
 
   def __post_init__(self):
     """Raises ValueError that lists every field out of its range."""
-    faults = [
-      f"{name} is {getattr(self, name)!r}; valid: {valid}"
-      for valid, (is_valid, names) in _RANGES.items()
-      for name in names.split()
-      if not is_valid(getattr(self, name))
-    ]
-    faults += [
-      f"{name} is {getattr(self, name)!r}; valid: {', '.join(choices)}"
-      for name, choices in _CHOICES.items()
-      if getattr(self, name) not in choices
-    ]
+    faults = field_checks.faults(self, _RANGES, _CHOICES)
     if self.discriminator_noise and not self.standardise:
       faults.append(
         f"discriminator_noise is {self.discriminator_noise!r}; valid: 0 "
@@ -111,15 +101,6 @@ class LfgpConfig:
     return cls(**values)
 
 
-def _is_integer(value: Any) -> bool:
-  return isinstance(value, int) and not isinstance(value, bool)
-
-
-def _is_number(value: Any) -> bool:
-  is_number = isinstance(value, int | float) and not isinstance(value, bool)
-  return is_number and abs(value) < float("inf")  # false for NaN
-
-
 _INTEGERS_ABOVE_0 = (
   "warm_up episode_steps hidden_size batch_size xi "
   "discriminator_batch_size discriminator_every"
@@ -141,34 +122,16 @@ _SWITCHES = (
   "critic_layer_norm standardise bfloat16 bc_normalise "
   "gradient_penalty_per_task"
 )
-# What is valid -> test, names of fields.
-_RANGES: dict[str, tuple[Callable[[Any], bool], str]] = {
-  "an integer above 0": (
-    lambda value: _is_integer(value) and value > 0,
-    _INTEGERS_ABOVE_0,
-  ),
-  "an integer, 0 or more": (
-    lambda value: _is_integer(value) and value >= 0,
-    "random_steps bc_warm_start_updates",
-  ),
-  "a number above 0": (
-    lambda value: _is_number(value) and value > 0,
-    _NUMBERS_ABOVE_0,
-  ),
-  "a number, 0 or more": (
-    lambda value: _is_number(value) and value >= 0,
-    _NUMBERS_FROM_0,
-  ),
-  "a number": (_is_number, "target_entropy"),
-  "a number from 0 to 1": (
-    lambda value: _is_number(value) and 0 <= value <= 1,
-    _SHARES,
-  ),
-  "a number above 0, at most 1": (
-    lambda value: _is_number(value) and 0 < value <= 1,
-    "polyak scheduler_decay",
-  ),
-  "True or False": (lambda value: isinstance(value, bool), _SWITCHES),
+# What is valid -> names of fields; see `field_checks.py`.
+_RANGES = {
+  "an integer above 0": _INTEGERS_ABOVE_0,
+  "an integer, 0 or more": "random_steps bc_warm_start_updates",
+  "a number above 0": _NUMBERS_ABOVE_0,
+  "a number, 0 or more": _NUMBERS_FROM_0,
+  "a number": "target_entropy",
+  "a number from 0 to 1": _SHARES,
+  "a number above 0, at most 1": "polyak scheduler_decay",
+  "True or False": _SWITCHES,
 }
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,
