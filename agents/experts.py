@@ -35,11 +35,15 @@ class ExpertBatch(NamedTuple):
 
 
 class Batch(NamedTuple):
-  """Transitions shared by all tasks."""
+  """Transitions shared by all tasks, but for examples of success."""
 
   inputs: torch.Tensor  # [B, O], standardised
-  action: torch.Tensor  # [B, A]
+  action: torch.Tensor  # [B, A]; of examples: unused
   next_inputs: torch.Tensor  # [B, O], standardised
+  reward: torch.Tensor | None = None  # [K, B], where it was stored (SAC-X)
+  # int64 [B], where there are examples of success: the task that a row is an
+  # example of, or -1 for a transition of the replay.
+  owner: torch.Tensor | None = None
 
 
 def pooled_observations(
@@ -58,6 +62,25 @@ def pooled_observations(
   if missing:
     raise ValueError(f"no demonstrations of {', '.join(missing)}")
   return np.concatenate([demonstrations[task].observation for task in tasks])
+
+
+def check_sizes(
+  demonstrations: Mapping[str, DemonstrationArrays],
+  tasks: Sequence[str],
+  observation_size: int,
+  action_size: int,
+) -> None:
+  """Raises ValueError unless all are of the environment's sizes."""
+  for task in tasks:
+    sizes = (
+      demonstrations[task].observation.shape[1],
+      demonstrations[task].action.shape[1],
+    )
+    if sizes != (observation_size, action_size):
+      raise ValueError(
+        f"demonstrations of {task}: observation and action have {sizes} "
+        f"floats; the environment has {(observation_size, action_size)}"
+      )
 
 
 class ExpertPool:
@@ -87,20 +110,31 @@ class ExpertPool:
     def put(array: np.ndarray) -> torch.Tensor:
       return torch.from_numpy(np.asarray(array, np.float32)).to(device)
 
-    self._inputs = standardise(put(observation))
+    self._observation = put(observation)
     self._action = put(np.concatenate([part.action for part in parts]))
-    self._next_inputs = standardise(
-      put(np.concatenate([part.next_observation for part in parts]))
+    self._next_observation = put(
+      np.concatenate([part.next_observation for part in parts])
     )
+    self._standardise = standardise
     self._device = device
     self._tasks = tuple(tasks)
     self._sizes = np.array([len(part.action) for part in parts])
-    self._offsets = np.concatenate([[0], np.cumsum(self._sizes)[:-1]])
+    self._offsets = _offsets(self._sizes)
     last = np.concatenate([part.is_last for part in parts])
     self._finals = np.flatnonzero(last)
     self._final_sizes = np.array([int(part.is_last.sum()) for part in parts])
-    self._final_offsets = np.concatenate(
-      [[0], np.cumsum(self._final_sizes)[:-1]]
+    self._final_offsets = _offsets(self._final_sizes)
+    self.refresh()
+
+  def refresh(self) -> None:
+    """Standardises all rows anew, after the standardiser has changed."""
+    self._inputs = self._standardise(self._observation)
+    self._next_inputs = self._standardise(self._next_observation)
+    self._deviations = torch.stack(
+      [
+        self._next_inputs[start : start + size].std(0, correction=0)
+        for start, size in zip(self._offsets, self._sizes, strict=True)
+      ]
     )
 
   def check_finals(self) -> None:
@@ -150,11 +184,49 @@ class ExpertPool:
     Returns:
       [n, ...] tensors.
     """
-    tasks = len(self._sizes)
-    share = rows // tasks
-    counts = np.full(tasks, share)
-    counts[0] += rows - share * tasks
-    task = np.repeat(np.arange(tasks), counts)
+    task = self._split(rows)
     index = self._offsets[task] + generator.integers(self._sizes[task])
     at = torch.from_numpy(index).to(self._device)
     return Batch(self._inputs[at], self._action[at], self._next_inputs[at])
+
+  def sample_examples(
+    self, generator: np.random.Generator, rows: int, noise: float
+  ) -> Batch:
+    """Draws states of success, split as `sample_transitions` splits.
+
+    Each is what a row of success led to. An example stands for staying where
+    it is: its next state is itself, with noise of its own.
+
+    Args:
+      generator: source of indices and noise.
+      rows: n, examples in all.
+      noise: standard deviation, in those of the task's own demonstrations.
+
+    Returns:
+      [n, ...] tensors with `owner`; the actions are those of the rows.
+    """
+    task = self._split(rows)
+    chosen = self._final_offsets[task] + generator.integers(
+      self._final_sizes[task]
+    )
+    at = torch.from_numpy(self._finals[chosen]).to(self._device)
+    owner = torch.from_numpy(task).to(self._device)
+    state, deviation = self._next_inputs[at], noise * self._deviations[owner]
+
+    def disturbed() -> torch.Tensor:
+      drawn = generator.standard_normal(state.shape, np.float32)
+      return state + deviation * torch.from_numpy(drawn).to(self._device)
+
+    return Batch(disturbed(), self._action[at], disturbed(), owner=owner)
+
+  def _split(self, rows: int) -> np.ndarray:
+    """The task of each of `rows` rows: equal shares, the rest the main's."""
+    tasks = len(self._sizes)
+    counts = np.full(tasks, rows // tasks)
+    counts[0] += rows % tasks
+    return np.repeat(np.arange(tasks), counts)
+
+
+def _offsets(sizes: np.ndarray) -> np.ndarray:
+  """Where each part starts, if parts of these sizes lie end to end."""
+  return np.concatenate([[0], np.cumsum(sizes)[:-1]])

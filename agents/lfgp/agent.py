@@ -14,6 +14,7 @@ from agents.experts import (
   Batch,
   DemonstrationArrays,
   ExpertPool,
+  check_sizes,
   pooled_observations,
 )
 from agents.lfgp.config import LfgpConfig
@@ -287,16 +288,7 @@ def build(
   """
   device = torch.device(device)
   observation = pooled_observations(demonstrations, tasks)
-  for task in tasks:
-    sizes = (
-      demonstrations[task].observation.shape[1],
-      demonstrations[task].action.shape[1],
-    )
-    if sizes != (observation_size, action_size):
-      raise ValueError(
-        f"demonstrations of {task}: observation and action have {sizes} "
-        f"floats; the environment has {(observation_size, action_size)}"
-      )
+  check_sizes(demonstrations, tasks, observation_size, action_size)
   standardiser = Standardiser(observation_size)
   if config.standardise:
     standardiser.fit(observation, config.deviation_floor)

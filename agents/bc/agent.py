@@ -1,0 +1,221 @@
+"""Behaviour cloning as the supervised loop sees it, and its builder."""
+
+import copy
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from agents import serialisation
+from agents.bc.config import BcConfig
+from agents.bc.pairs import SplitPairs
+from agents.cloning import IntentionCloner
+from agents.experts import (
+  DemonstrationArrays,
+  check_sizes,
+  pooled_observations,
+)
+from agents.losses.behaviour_cloning import behaviour_cloning_loss
+from agents.metering import Meter
+from agents.networks import layouts
+from agents.networks.intentions import IntentionNetwork
+from agents.networks.trunk import Standardiser
+from agents.policy import Policy
+from lfgp_dmc import seeding
+from lfgp_dmc.types import Metrics
+
+_LOSS = "behaviour_cloning"
+
+
+class BcAgent:
+  """Imitates by epochs, and keeps the weights that validated best.
+
+  The paper's training: each task's pairs are split 70/30; after each epoch the
+  validation loss, the mean over tasks, is measured; `overfit_tolerance` epochs
+  without improvement end it.
+  """
+
+  def __init__(
+    self,
+    config: BcConfig,
+    tasks: Sequence[str],
+    network: IntentionNetwork,
+    pairs: SplitPairs,
+    shuffling: np.random.Generator,
+  ):
+    """Puts the parts together; see `build`.
+
+    Args:
+      config: settings.
+      tasks: names of the K tasks, the main task first.
+      network: what to train.
+      pairs: of all tasks, split.
+      shuffling: source of each epoch's order.
+    """
+    self.tasks = tuple(tasks)
+    self._config = config
+    self._network = network
+    self._pairs = pairs
+    self._shuffling = shuffling
+    self._best = copy.deepcopy(network).requires_grad_(False)
+    self.policy = Policy(self._best, tasks)  # of the best weights so far
+    self._cloner = IntentionCloner(
+      network,
+      config.learning_rate,
+      config.weight_decay,
+      config.max_gradient_norm or math.inf,
+      config.bfloat16,
+    )
+    device = network.standardiser.mean.device
+    self._meter = Meter(tasks, (f"loss/{_LOSS}",), (_LOSS,), device)
+    self._epoch = self._best_epoch = 0
+    self._best_loss = math.inf
+    self._validation = [math.nan] * len(self.tasks)
+    self._order: list[torch.Tensor] = []  # batches left in this epoch
+
+  @property
+  def has_converged(self) -> bool:
+    """Whether validation has not improved for `overfit_tolerance` epochs."""
+    return self._epoch - self._best_epoch >= self._config.overfit_tolerance
+
+  def begin_epoch(self) -> int:
+    """Shuffles the training pairs; returns the updates of the epoch."""
+    order = self._pairs.shuffled(self._shuffling, self._config.batch_size)
+    self._order = list(order.unbind()[::-1])
+    return len(self._order)
+
+  def update(self) -> None:
+    """Makes one update, on the epoch's next batch."""
+    batch = self._pairs.batch(self._order.pop())
+    self._meter.add(self._cloner.update(batch))
+
+  def end_epoch(self) -> None:
+    """Validates, and keeps the weights if they are the best so far."""
+    self._epoch += 1
+    self._validation = self.validation_losses()
+    loss = float(np.mean(self._validation))
+    if loss < self._best_loss:
+      self._best_loss, self._best_epoch = loss, self._epoch
+      self._best.load_state_dict(self._network.state_dict())
+
+  def validation_losses(self) -> list[float]:
+    """Each task's mean loss over all of its validation pairs."""
+    network, losses = self._network, []
+    with torch.inference_mode():
+      for index in range(len(self.tasks)):
+        inputs, action = self._pairs.validation(index)
+        mean, _ = network.heads.one(network.trunk(inputs[0]), index)
+        loss, _ = behaviour_cloning_loss(mean[None], action)
+        losses.append(loss.item())
+    return losses
+
+  def metrics(self) -> Metrics:
+    """Training's means since the last call, and the last validation."""
+    means = self._meter.read()
+    row = {
+      "epoch": float(self._epoch),
+      "best_epoch": float(self._best_epoch),
+      "loss/train": means[f"loss/{_LOSS}"],
+      "loss/validation": float(np.mean(self._validation)),
+      "loss/best_validation": self._best_loss,
+    }
+    for task, loss in zip(self.tasks, self._validation, strict=True):
+      row[f"loss_train/{task}"] = means[f"{_LOSS}/{task}"]
+      row[f"loss_validation/{task}"] = loss
+    return row
+
+  def policy_arrays(self) -> dict[str, np.ndarray]:
+    """What acting needs, of the best weights so far."""
+    return self.policy.arrays()
+
+  def policy_options(self) -> dict[str, Any]:
+    """The JSON-able options that go with `policy_arrays`."""
+    return self.policy.options()
+
+  def state_dict(self) -> dict[str, Any]:
+    """Arrays and JSON-able values; taken between epochs."""
+    return {
+      "network": serialisation.module_state(self._network),
+      "best": serialisation.module_state(self._best),
+      "cloner": self._cloner.state_dict(),
+      "meter": self._meter.state_dict(),
+      "shuffling": serialisation.numpy_generator_state(self._shuffling),
+      "epoch": self._epoch,
+      "best_epoch": self._best_epoch,
+      "best_loss": np.asarray(self._best_loss),
+      "validation": np.asarray(self._validation),
+    }
+
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned."""
+    serialisation.load_module_state(self._network, state["network"], "network")
+    serialisation.load_module_state(self._best, state["best"], "best network")
+    self._cloner.load_state_dict(state["cloner"])
+    self._meter.load_state_dict(state["meter"])
+    serialisation.load_numpy_generator_state(
+      self._shuffling, state["shuffling"]
+    )
+    self._epoch = int(state["epoch"])
+    self._best_epoch = int(state["best_epoch"])
+    self._best_loss = float(state["best_loss"])
+    self._validation = [float(loss) for loss in state["validation"]]
+    self._order = []
+
+
+def build(
+  config: BcConfig,
+  tasks: Sequence[str],
+  demonstrations: Mapping[str, DemonstrationArrays],
+  replay: object,
+  seed: int,
+  device: torch.device | str,
+  observation_size: int,
+  action_size: int,
+) -> BcAgent:
+  """Builds a BC agent.
+
+  Args:
+    config: settings.
+    tasks: names of the K tasks, the main task first.
+    demonstrations: task -> arrays.
+    replay: not used; all builders take the same arguments.
+    seed: every random number of the agent follows from it.
+    device: where to compute.
+    observation_size: O.
+    action_size: A.
+
+  Returns:
+    The agent; same seed and calls, same numbers.
+
+  Raises:
+    ValueError: demonstrations are missing, too few, or of other sizes.
+  """
+  del replay
+  device = torch.device(device)
+  observation = pooled_observations(demonstrations, tasks)
+  check_sizes(demonstrations, tasks, observation_size, action_size)
+  standardiser = Standardiser(observation_size)
+  if config.standardise:
+    standardiser.fit(observation, config.deviation_floor)
+  initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
+  layout, hidden = config.layout, config.hidden_size
+  network = IntentionNetwork(
+    standardiser,
+    layouts.make_trunk(layout, observation_size, hidden, initial),
+    layouts.make_intention_heads(
+      layout, len(tasks), observation_size, hidden, action_size, initial
+    ),
+    owns_trunk=True,
+  ).to(device)
+  pairs = SplitPairs(
+    demonstrations,
+    tasks,
+    standardiser,
+    device,
+    config.validation_share,
+    seeding.generator(seed, "split"),
+  )
+  shuffling = seeding.generator(seed, "shuffling")
+  return BcAgent(config, tasks, network, pairs, shuffling)
