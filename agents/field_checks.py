@@ -27,6 +27,7 @@ TESTS: dict[str, Callable[[Any], bool]] = {
     is_number(value) and 0 < value <= 1
   ),
   "a number above 0, below 1": lambda value: is_number(value) and 0 < value < 1,
+  "a folder's name, or nothing": lambda value: isinstance(value, str),
   "True or False": lambda value: isinstance(value, bool),
 }
 

@@ -60,7 +60,8 @@ class Policy:
       arrays: name -> array.
       options: `tasks` (list of str), `observation_size`, `action_size`,
         `hidden_size` (int), `layout` (of `networks/layouts.py`; missing: a
-        shared trunk): an agent's `policy_options`.
+        shared trunk), `absorbing_flag` (missing: False): an agent's
+        `policy_options`.
 
     Returns:
       The policy, on the CPU.
@@ -87,11 +88,15 @@ class Policy:
     assert tasks is not None
     observations, actions, hidden = (options[name] for name in _SIZES)
     generator = torch.Generator()
+    standardiser = Standardiser(
+      observations, bool(options.get("absorbing_flag", False))
+    )
+    inputs = standardiser.input_size
     network = IntentionNetwork(
-      Standardiser(observations),
-      layouts.make_trunk(layout, observations, hidden, generator),
+      standardiser,
+      layouts.make_trunk(layout, inputs, hidden, generator),
       layouts.make_intention_heads(
-        layout, len(tasks), observations, hidden, actions, generator
+        layout, len(tasks), inputs, hidden, actions, generator
       ),
       owns_trunk=True,
     )
@@ -158,6 +163,7 @@ class Policy:
       "action_size": self.action_size,
       "hidden_size": network.heads.output.weight.shape[1],
       "layout": layouts.layout_of(network.heads),
+      "absorbing_flag": network.standardiser.absorbing_flag,
     }
 
   @property

@@ -1,4 +1,4 @@
-"""Rewards from the discriminator's logits, made anew at sample time."""
+"""Rewards made anew at sample time: from logits, or by who owns a row."""
 
 from collections.abc import Callable
 
@@ -43,7 +43,25 @@ def reward_from_logits(
     raise ValueError(
       f"unknown reward {variant!r}; valid: {', '.join(VARIANTS)}"
     )
-  reward = VARIANTS[variant](logits_expert_high)
+  return bounded(VARIANTS[variant](logits_expert_high), clip, scale)
+
+
+def bounded(reward: torch.Tensor, clip: float, scale: float) -> torch.Tensor:
+  """Clips to [-clip, clip], unless `clip` is 0; then scales."""
   if clip > 0:
     reward = reward.clamp(-clip, clip)
   return reward * scale
+
+
+def reward_from_examples(owner: torch.Tensor, tasks: int) -> torch.Tensor:
+  """+1 for a task's own examples of success, -1 for all else (SQIL's idea).
+
+  Args:
+    owner: int64 [B], the task that a row is an example of; -1: none.
+    tasks: K.
+
+  Returns:
+    float32 [K, B].
+  """
+  own = torch.arange(tasks, device=owner.device)[:, None] == owner
+  return 2.0 * own.float() - 1.0

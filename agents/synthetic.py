@@ -81,9 +81,16 @@ def transitions(
 class ArrayReplay:
   """A fixed replay over given transitions."""
 
-  def __init__(self, rows: Transition):
-    """Keeps the arrays [N, ...]."""
+  def __init__(
+    self,
+    rows: Transition,
+    rewards: np.ndarray | None = None,
+    reward_tasks: Sequence[str] = (),
+  ):
+    """Keeps the arrays [N, ...] and rewards [N, `reward_tasks`], if any."""
     self._rows = rows
+    self._rewards = rewards
+    self.reward_tasks = tuple(reward_tasks)
 
   def __len__(self) -> int:
     """Transitions stored."""
@@ -98,3 +105,8 @@ class ArrayReplay:
   def gather(self, indices: np.ndarray, /) -> Transition:
     """Copies rows out: float32 arrays [count, ...]."""
     return Transition(*(array[indices] for array in self._rows))
+
+  def gather_rewards(self, indices: np.ndarray, /) -> np.ndarray:
+    """Copies their rewards out: float32 [count, `reward_tasks`]."""
+    assert self._rewards is not None, "this replay keeps no rewards"
+    return self._rewards[indices]

@@ -186,9 +186,14 @@ class _Pile:
     )
     finals = self._wanted - self._pairs
     kept = np.r_[: self._pairs, len(action) - finals : len(action)]
-    arrays = (observation, action, next_observation, episode, is_last)
     return Collected(
-      Demonstrations(*(array[kept] for array in arrays)),
+      Demonstrations(
+        observation[kept],
+        action[kept],
+        next_observation[kept],
+        episode[kept],
+        is_last[kept],
+      ),
       self._attempts,
       len(self._rows),
     )

@@ -2,47 +2,28 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import torch
 import tqdm
 
 from agents import serialisation
 from agents.cloning import IntentionCloner
 from agents.experts import (
-  Batch,
-  DemonstrationArrays,
   ExpertPool,
-  check_sizes,
-  pooled_observations,
 )
+from agents.lfgp import carrying
+from agents.lfgp.batches import BatchMaker, Replay, reward_columns
 from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import SCALAR_METRICS, TASK_METRICS, LfgpLearner
-from agents.lfgp.networks import make_networks
+from agents.lfgp.learner import LfgpLearner
+from agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from agents.metering import Meter
-from agents.networks.trunk import Standardiser
 from agents.policy import Policy
-from agents.schedulers import Scheduler, make_scheduler, period_returns
+from agents.schedulers import Scheduler, period_returns
 from lfgp_dmc import seeding
-from lfgp_dmc.types import Episode, Metrics, Transition
+from lfgp_dmc.types import Episode, Metrics
 
 _CLONING_LOG_EVERY = 1000  # warm-start updates between readings of its loss
-
-
-class Replay(Protocol):
-  """The transitions that the agent samples; the training loop adds them."""
-
-  def __len__(self) -> int:
-    """Transitions stored."""
-
-  def sample_indices(
-    self, generator: np.random.Generator, count: int, /
-  ) -> np.ndarray:
-    """Draws int64 [count], uniform with replacement."""
-
-  def gather(self, indices: np.ndarray, /) -> Transition:
-    """Copies rows out: float32 arrays [n, ...]."""
 
 
 class LfgpAgent:
@@ -54,7 +35,7 @@ class LfgpAgent:
     tasks: Sequence[str],
     learner: LfgpLearner,
     scheduler: Scheduler,
-    experts: ExpertPool,
+    experts: ExpertPool | None,
     replay: Replay,
     seed: int,
   ):
@@ -65,7 +46,7 @@ class LfgpAgent:
       tasks: names of the K tasks, the main task first.
       learner: networks and updates.
       scheduler: chooses intentions.
-      experts: all tasks' demonstrations.
+      experts: all tasks' demonstrations; None if the config uses none.
       replay: transitions, filled by the training loop.
       seed: of the agent's own random streams.
     """
@@ -75,17 +56,29 @@ class LfgpAgent:
     self._learner = learner
     self._scheduler = scheduler
     self._experts = experts
-    self._replay = replay
+    device = learner.networks.log_temperature.device
     self._standardise = learner.networks.intentions.standardiser
-    self._device = learner.networks.log_temperature.device
     self._acting = seeding.generator(seed, "acting")
     self._sampling = seeding.generator(seed, "sampling")
-    self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, self._device)
+    self._batches = BatchMaker(
+      config,
+      tasks,
+      replay,
+      experts,
+      self._standardise,
+      device,
+      self._sampling,
+    )
+    self._main_reward = 0
+    if config.keeps_rewards:
+      (self._main_reward,) = reward_columns(replay, tasks[:1])
+    self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, device)
     self._choices = np.zeros(len(self.tasks), np.int64)
     self._env_steps = 0
     self._episode_step = 0
     self._task = self.tasks[0]
-    self._has_started = config.bc_warm_start_updates == 0
+    self._first_updates = 0  # before the first step, after a transfer
+    self._has_started = False
 
   @property
   def updates(self) -> int:
@@ -97,15 +90,69 @@ class LfgpAgent:
     """The task whose intention acts now."""
     return self._task
 
-  def prepare(self, progress_bar: bool = False) -> None:
-    """Makes the warm start by behaviour cloning, if any is due.
+  def start_from(self, policy: Policy) -> None:
+    """Lets the intentions start as those of a policy, by task name.
 
     Args:
-      progress_bar: whether to show its updates' rate and time left.
+      policy: with the same sizes; its standardisation comes along, and so
+        does its trunk, for the critics too unless `actor_trunk` is "own".
+
+    Raises:
+      ValueError: it has other sizes, or none of our tasks.
     """
-    if not self._has_started:
+    self._check_common(policy.tasks, "the policy")
+    carrying.carry_heads(
+      self._learner.networks.intentions,
+      policy.arrays(),
+      self.tasks,
+      policy.tasks,
+      "the policy",
+    )
+    self._refresh_inputs()
+    self._learner.adopt_intention_trunk()
+
+  def carry_over(
+    self,
+    networks: Mapping[str, Mapping[str, np.ndarray]],
+    source_tasks: Sequence[str],
+  ) -> None:
+    """Takes over what another agent learned (section 5.2 of the paper).
+
+    Temperatures, optimisers and scheduler stay fresh. If a task is new,
+    `prepare` will make `transfer_updates` updates on the replay.
+
+    Args:
+      networks: `state_dict()["learner"]["networks"]` of the other agent.
+      source_tasks: its tasks.
+
+    Raises:
+      ValueError: its networks have other sizes, or none of our tasks.
+    """
+    self._check_common(source_tasks, "the other run")
+    own = self._learner.networks
+    carrying.carry_networks(own, networks, self.tasks, source_tasks)
+    self._refresh_inputs()
+    if set(self.tasks) - set(source_tasks):
+      self._first_updates = self._config.transfer_updates
+
+  def prepare(self, progress_bar: bool = False) -> None:
+    """Makes the updates that are due before the first step, if any.
+
+    Args:
+      progress_bar: whether to show the updates' rate and time left.
+    """
+    if self._has_started:
+      return
+    if self._config.bc_warm_start_updates:
       self._warm_start(progress_bar)
-      self._has_started = True
+    for _ in tqdm.trange(
+      self._first_updates,
+      desc="on the other run's replay",
+      unit="update",
+      disable=not (progress_bar and self._first_updates),
+    ):
+      self.update()
+    self._has_started = True
 
   def begin_episode(self) -> None:
     """Starts an episode."""
@@ -140,30 +187,16 @@ class LfgpAgent:
     Args:
       episode: the T steps since `begin_episode`.
     """
-    reward = self._learner.rewards(
-      self._standardise(self._put(episode.observation)),
-      self._put(episode.action),
-    )
     self._scheduler.end_episode(
       period_returns(
-        reward[0].cpu().numpy(), self._config.xi, self._config.discount
+        self._main_rewards(episode), self._config.xi, self._config.discount
       ).tolist()
     )
 
   def update(self) -> None:
     """Makes one update of all networks."""
-    config, updates = self._config, self._learner.updates
-    discriminator_batch = None
-    if updates % config.discriminator_every == 0:
-      discriminator_batch = self._sample(config.batch_size)
-    expert = None
-    if discriminator_batch is not None or config.bc_weight > 0:
-      rows = config.discriminator_batch_size
-      finals = int(config.discriminator_final_share * rows)
-      expert = self._experts.sample(self._sampling, rows, finals)
-    share = config.expert_share * config.expert_share_decay**updates
-    batch = self._sample(config.batch_size, int(share * config.batch_size))
-    self._meter.add(self._learner.update(batch, discriminator_batch, expert))
+    draw = self._batches.draw(self._learner.updates)
+    self._meter.add(self._learner.update(*draw))
 
   def metrics(self) -> Metrics:
     """Means since the last call; NaN for what has not happened since."""
@@ -210,30 +243,40 @@ class LfgpAgent:
     serialisation.load_numpy_generator_state(self._sampling, state["sampling"])
     self._env_steps = int(state["env_steps"])
     self._has_started = bool(state["has_started"])
+    self._refresh_inputs()
     self._episode_step = 0
 
-  def _put(self, array: np.ndarray) -> torch.Tensor:
-    return torch.from_numpy(np.asarray(array, np.float32)).to(self._device)
+  def _main_rewards(self, episode: Episode) -> np.ndarray:
+    """The main task's reward of each step, float [T]."""
+    match self._config.reward_source:
+      case "replay":
+        assert episode.rewards is not None, "the loop keeps rewards"
+        return episode.rewards[:, self._main_reward]
+      case "examples":
+        return np.full(len(episode.action), -self._config.reward_scale)
+    put = self._batches.put
+    inputs = self._standardise(put(episode.observation))
+    return self._learner.rewards(inputs, put(episode.action))[0].cpu().numpy()
 
-  def _sample(self, rows: int, expert_rows: int = 0) -> Batch:
-    """Transitions of the replay, the last `expert_rows` from the experts."""
-    indices = self._replay.sample_indices(self._sampling, rows - expert_rows)
-    part = self._replay.gather(indices)
-    batch = Batch(
-      self._standardise(self._put(part.observation)),
-      self._put(part.action),
-      self._standardise(self._put(part.next_observation)),
-    )
-    if not expert_rows:
-      return batch
-    expert = self._experts.sample_transitions(self._sampling, expert_rows)
-    return Batch(*map(torch.cat, zip(batch, expert, strict=True)))
+  def _check_common(self, source_tasks: Sequence[str], what: str) -> None:
+    if not set(self.tasks) & set(source_tasks):
+      raise ValueError(
+        f"{what} has none of {', '.join(self.tasks)}; it has: "
+        f"{', '.join(source_tasks)}"
+      )
+
+  def _refresh_inputs(self) -> None:
+    """After the standardiser has changed."""
+    if self._experts is not None:
+      self._experts.refresh()
 
   def _warm_start(self, progress_bar: bool) -> None:
     """Pure behaviour cloning; then the critics start from its trunk."""
-    config = self._config
+    config, intentions = self._config, self._learner.networks.intentions
+    assert self._experts is not None, "a warm start needs demonstrations"
+    intentions.owns_trunk = True  # cloning trains it, whosever it is later
     cloner = IntentionCloner(
-      self._learner.networks.intentions,
+      intentions,
       config.bc_learning_rate,
       config.weight_decay,
       config.max_gradient_norm,
@@ -253,66 +296,5 @@ class LfgpAgent:
       if update % _CLONING_LOG_EVERY == 0:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")
-    if config.actor_trunk == "shared":
-      self._learner.adopt_intention_trunk()
-
-
-def build(
-  config: LfgpConfig,
-  tasks: Sequence[str],
-  demonstrations: Mapping[str, DemonstrationArrays],
-  replay: Replay,
-  seed: int,
-  device: torch.device | str,
-  observation_size: int,
-  action_size: int,
-) -> LfgpAgent:
-  """Builds an LfGP agent.
-
-  Args:
-    config: settings.
-    tasks: names of the K tasks, the main task first.
-    demonstrations: task -> arrays.
-    replay: transitions, filled by the training loop.
-    seed: every random number of the agent follows from it.
-    device: where to compute.
-    observation_size: O.
-    action_size: A.
-
-  Returns:
-    The agent; same seed and calls, same numbers.
-
-  Raises:
-    ValueError: demonstrations are missing or of other sizes, or the scheduler
-      does not fit the tasks.
-  """
-  device = torch.device(device)
-  observation = pooled_observations(demonstrations, tasks)
-  check_sizes(demonstrations, tasks, observation_size, action_size)
-  standardiser = Standardiser(observation_size)
-  if config.standardise:
-    standardiser.fit(observation, config.deviation_floor)
-  standardiser.to(device)
-  initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
-  networks = make_networks(
-    config,
-    len(tasks),
-    observation_size,
-    action_size,
-    standardiser,
-    initial,
-    device,
-  )
-  noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
-  experts = ExpertPool(demonstrations, tasks, standardiser, device)
-  if config.discriminator_final_share > 0:
-    experts.check_finals()
-  scheduler = make_scheduler(
-    config,
-    tasks,
-    0,
-    math.ceil(config.episode_steps / config.xi),
-    seeding.generator(seed, "scheduler"),
-  )
-  learner = LfgpLearner(config, networks, noise)
-  return LfgpAgent(config, tasks, learner, scheduler, experts, replay, seed)
+    intentions.owns_trunk = config.owns_trunk
+    self._learner.adopt_intention_trunk()

@@ -8,6 +8,9 @@ from agents import field_checks, rewards, schedulers
 from agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
+# Where rewards come from: the discriminators; the replay, which stores dense
+# rewards (SAC-X); examples of success, +1 for a task's own and -1 for all else.
+REWARD_SOURCES = ("discriminator", "replay", "examples")
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -27,6 +30,7 @@ class LfgpConfig:
   critic_layer_norm: bool = False
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
   deviation_floor: float = 0.01  # smallest deviation, in the input's unit
+  absorbing_flag: bool = False  # a last input, 0: no state is absorbing here
   bfloat16: bool = False  # products in bfloat16 (autocast)
 
   # Intentions and critics.
@@ -40,8 +44,19 @@ class LfgpConfig:
   target_entropy: float = -4.0  # nats
   max_gradient_norm: float = 10.0  # critics, intentions, log alpha apart
   weight_decay: float = 0.0  # above 0: AdamW, on all but alpha
+  value_penalty: float = 0.0  # lambda of values out of bounds (later work: 10)
+  value_penalty_window: int = 50  # updates that the bounds' medians run over
+  freeze_updates: int = 0  # first updates, with the intentions' trunk frozen
 
-  # Discriminators and their reward.
+  # Rewards.
+  reward_source: str = "discriminator"  # or "replay", "examples"
+  reward: str = "logit"  # of discriminators; see agents/rewards.py
+  reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
+  reward_scale: float = 1.0  # later work, with examples: 0.1
+  example_share: float = 0.5  # of the critics' batch, if rewards are examples'
+  example_noise: float = 0.1  # on examples, in the demonstrations' deviations
+
+  # Discriminators.
   discriminator_learning_rate: float = 3e-4
   discriminator_batch_size: int = 256  # expert pairs a task
   discriminator_input: str = "state_action"  # or "state"
@@ -50,9 +65,6 @@ class LfgpConfig:
   discriminator_final_share: float = 0.0  # of expert pairs, rows of success
   gradient_penalty: float = 10.0  # lambda
   gradient_penalty_per_task: bool = False
-  reward: str = "logit"  # see agents/rewards.py
-  reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
-  reward_scale: float = 1.0
 
   # Scheduler.
   scheduler: str = "q_table"
@@ -73,6 +85,10 @@ class LfgpConfig:
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start
 
+  # Other runs.
+  init_from: str = ""  # policy folder whose intentions the actor starts from
+  transfer_updates: int = 1000  # before the first step, if a task is new
+
   def __post_init__(self):
     """Raises ValueError that lists every field out of its range."""
     faults = field_checks.faults(self, _RANGES, _CHOICES)
@@ -81,8 +97,63 @@ class LfgpConfig:
         f"discriminator_noise is {self.discriminator_noise!r}; valid: 0 "
         "unless standardise is True (its unit is the standardised input's)"
       )
+    if self.init_from and self.bc_warm_start_updates:
+      faults.append(
+        f"init_from is {self.init_from!r}; valid: nothing, if there are "
+        "bc_warm_start_updates"
+      )
+    if not faults:
+      faults = self._reward_faults()
     if faults:
       raise ValueError(f"LfgpConfig: {'; '.join(faults)}")
+
+  def _reward_faults(self) -> list[str]:
+    """What does not go together with the source of rewards."""
+    source, faults = self.reward_source, []
+    if source != "discriminator" and self.expert_share:
+      faults.append(
+        f"expert_share is {self.expert_share!r}; valid: 0 unless reward_source "
+        "is discriminator (expert rows have no other reward)"
+      )
+    if source != "examples":
+      return faults
+    if self.scheduler == "q_table":
+      faults.append(
+        "scheduler is 'q_table'; valid: another, if reward_source is examples "
+        "(whatever is done earns -1)"
+      )
+    rows = int(self.example_share * self.batch_size)
+    if not 0 < rows < self.batch_size:
+      faults.append(
+        f"example_share is {self.example_share!r}; valid: one that puts some "
+        "of batch_size rows on either side"
+      )
+    return faults
+
+  @property
+  def uses_demonstrations(self) -> bool:
+    """Whether there is anything to do with demonstrations."""
+    return (
+      self.reward_source != "replay"
+      or self.bc_weight > 0
+      or self.bc_warm_start_updates > 0
+      or self.standardise
+    )
+
+  @property
+  def keeps_rewards(self) -> bool:
+    """Whether the replay has to keep dense rewards."""
+    return self.reward_source == "replay"
+
+  @property
+  def owns_trunk(self) -> bool:
+    """Whether the intentions have a trunk apart from the critics'.
+
+    They do if asked for, and if they start from cloned behaviour, which the
+    critics' loss would undo; unless the common trunk is frozen at first.
+    """
+    is_cloned = self.bc_warm_start_updates > 0 or bool(self.init_from)
+    return self.actor_trunk == "own" or (is_cloned and self.freeze_updates == 0)
 
   @classmethod
   def from_mapping(cls, values: Mapping[str, Any]) -> "LfgpConfig":
@@ -103,7 +174,7 @@ class LfgpConfig:
 
 _INTEGERS_ABOVE_0 = (
   "warm_up episode_steps hidden_size batch_size xi "
-  "discriminator_batch_size discriminator_every"
+  "discriminator_batch_size discriminator_every value_penalty_window"
 )
 _NUMBERS_ABOVE_0 = (
   "updates_per_step deviation_floor critic_learning_rate "
@@ -112,31 +183,35 @@ _NUMBERS_ABOVE_0 = (
   "bc_learning_rate scheduler_temperature scheduler_minimum"
 )
 _NUMBERS_FROM_0 = (
-  "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight"
+  "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
+  "value_penalty example_noise"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "
-  "bc_decay scheduler_phi main_weight handcrafted_probability"
+  "bc_decay scheduler_phi main_weight handcrafted_probability example_share"
 )
 _SWITCHES = (
   "critic_layer_norm standardise bfloat16 bc_normalise "
-  "gradient_penalty_per_task"
+  "gradient_penalty_per_task absorbing_flag"
 )
 # What is valid -> names of fields; see `field_checks.py`.
 _RANGES = {
   "an integer above 0": _INTEGERS_ABOVE_0,
-  "an integer, 0 or more": "random_steps bc_warm_start_updates",
+  "an integer, 0 or more": "random_steps bc_warm_start_updates "
+  "freeze_updates transfer_updates",
   "a number above 0": _NUMBERS_ABOVE_0,
   "a number, 0 or more": _NUMBERS_FROM_0,
   "a number": "target_entropy",
   "a number from 0 to 1": _SHARES,
   "a number above 0, at most 1": "polyak scheduler_decay",
   "True or False": _SWITCHES,
+  "a folder's name, or nothing": "init_from",
 }
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,
   "discriminator_input": discriminator.INPUTS,
   "layout": layouts.LAYOUTS,
   "reward": tuple(rewards.VARIANTS),
+  "reward_source": REWARD_SOURCES,
   "scheduler": schedulers.NAMES,
 }

@@ -10,49 +10,23 @@ from torch import nn
 from agents import serialisation
 from agents.experts import Batch, ExpertBatch
 from agents.lfgp.config import LfgpConfig
+from agents.lfgp.discriminating import DiscriminatorLearner
 from agents.lfgp.networks import LfgpNetworks
 from agents.losses.behaviour_cloning import behaviour_cloning_loss
-from agents.losses.critic import critic_loss, soft_bellman_target
-from agents.losses.discriminator import (
-  discriminator_loss,
-  gradient_penalty_loss,
-  mix,
+from agents.losses.critic import (
+  critic_loss,
+  soft_bellman_target,
+  value_penalty_loss,
 )
 from agents.losses.intention import intention_loss
 from agents.losses.temperature import temperature_loss
 from agents.networks import tanh_gaussian
 from agents.optimisation import clipped_step, frozen, make_optimiser, polyak
-from agents.rewards import reward_from_logits
+from agents.rewards import bounded, reward_from_examples
+from agents.value_bounds import ValueBounds
 
 Metrics = dict[str, torch.Tensor]
 
-# What `update` reports; the second are [K].
-SCALAR_METRICS = (
-  "loss/discriminator",
-  "loss/gradient_penalty",
-  "loss/critic",
-  "loss/policy",
-  "loss/temperature",
-  "loss/behaviour_cloning",
-  "gradient_norm/discriminator_input",
-  "gradient_norm/critic",
-  "gradient_norm/policy",
-  "gradient_norm/temperature",
-)
-TASK_METRICS = (
-  "accuracy_expert",
-  "accuracy_policy",
-  "logit_expert",
-  "logit_policy",
-  "reward",
-  "q",
-  "q_max",  # largest |Q| of the batch
-  "q_bound",  # largest |reward| of the batch / (1 - gamma)
-  "temperature",
-  "entropy",
-  "saturation",  # share of the intention's action floats beyond 0.99
-  "behaviour_cloning",
-)
 _SATURATED = 0.99
 
 
@@ -81,11 +55,6 @@ class LfgpLearner:
     self._policy_parameters = networks.intentions.trained_parameters()
     decay = config.weight_decay
     self._optimisers = {
-      "discriminator": make_optimiser(
-        list(networks.discriminator.parameters()),
-        config.discriminator_learning_rate,
-        decay,
-      ),
       "critic": make_optimiser(
         self._critic_parameters, config.critic_learning_rate, decay
       ),
@@ -96,6 +65,18 @@ class LfgpLearner:
         [networks.log_temperature], config.temperature_learning_rate
       ),
     }
+    self._discriminator = None
+    if networks.discriminator is not None:
+      self._discriminator = DiscriminatorLearner(
+        config, networks.discriminator, generator
+      )
+      self._optimisers["discriminator"] = self._discriminator.optimiser
+    self._bounds = ValueBounds(
+      len(networks.log_temperature),
+      config.value_penalty_window,
+      config.discount,
+      self._device,
+    )
 
   def update(
     self,
@@ -107,7 +88,7 @@ class LfgpLearner:
 
     Args:
       batch: B transitions for critics and intentions; their rewards come from
-        the discriminator just updated.
+        the discriminator just updated, unless the config says otherwise.
       discriminator_batch: other transitions, for the discriminator; None:
         leave it as it is.
       expert: each task's own pairs, for the discriminator and the BC term;
@@ -121,9 +102,15 @@ class LfgpLearner:
       if expert is None:
         raise ValueError("the discriminator's update needs expert pairs")
       metrics |= self.update_discriminator(discriminator_batch, expert)
-    reward = self.rewards(batch.inputs, batch.action)
-    metrics |= self._update_critics(batch, reward)
-    log_prob, policy_metrics = self._update_intentions(batch.inputs, expert)
+    inputs = batch.inputs
+    if batch.owner is not None:  # intentions learn from the replay's rows
+      inputs = inputs[batch.owner < 0]
+      batch = self._with_fresh_actions(batch)
+    trunk = self.networks.intentions.trunk
+    is_frozen = self.updates < self._config.freeze_updates
+    with frozen(list(trunk.parameters()) if is_frozen else []):
+      metrics |= self._update_critics(batch, self._rewards_of(batch))
+      log_prob, policy_metrics = self._update_intentions(inputs, expert)
     metrics |= policy_metrics
     metrics |= self._update_temperatures(log_prob)
     polyak(
@@ -142,30 +129,7 @@ class LfgpLearner:
     Returns:
       The metrics of both losses.
     """
-    config, network = self._config, self.networks.discriminator
-    tasks, rows = expert.action.shape[:2]
-    policy_pairs = network.join(self._disturb(batch.inputs), batch.action)
-    expert_pairs = network.join(self._disturb(expert.inputs), expert.action)
-    share = torch.rand(
-      expert_pairs.shape, generator=self._generator, device=self._device
-    )
-    with self._autocast():
-      logits = network(torch.cat([policy_pairs, expert_pairs.flatten(0, 1)]))
-      gradient = network.input_gradient(
-        mix(policy_pairs, expert_pairs, share),
-        config.gradient_penalty_per_task,
-      )
-    policy_rows = policy_pairs.shape[0]
-    own = logits[policy_rows:].view(tasks, rows, tasks)
-    loss, metrics = discriminator_loss(
-      logits[:policy_rows], own.diagonal(dim1=0, dim2=2)
-    )
-    penalty, more = gradient_penalty_loss(gradient, config.gradient_penalty)
-    optimiser = self._optimisers["discriminator"]
-    optimiser.zero_grad()
-    (loss + penalty).backward()
-    optimiser.step()
-    return metrics | more
+    return self._discriminating().update(batch, expert)
 
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Every task's reward by the current discriminator.
@@ -177,12 +141,26 @@ class LfgpLearner:
     Returns:
       [K, B], without gradient.
     """
-    config, network = self._config, self.networks.discriminator
+    return self._discriminating().rewards(inputs, action)
+
+  def _rewards_of(self, batch: Batch) -> torch.Tensor:
+    """Every task's reward of a batch's rows, [K, B]."""
+    config = self._config
+    if batch.owner is not None:
+      tasks = len(self.networks.log_temperature)
+      return config.reward_scale * reward_from_examples(batch.owner, tasks)
+    if batch.reward is not None:
+      return bounded(batch.reward, config.reward_clip, config.reward_scale)
+    return self.rewards(batch.inputs, batch.action)
+
+  def _with_fresh_actions(self, batch: Batch) -> Batch:
+    """Gives each example of success an action of its task's intention."""
+    assert batch.owner is not None
+    at = torch.nonzero(batch.owner >= 0)[:, 0]
     with torch.no_grad(), self._autocast():
-      logits = network(network.join(inputs, action))
-    return reward_from_logits(
-      logits.t(), config.reward, config.reward_clip, config.reward_scale
-    )
+      action, _ = self._sample(*self.networks.intentions(batch.inputs[at]))
+    own = action[batch.owner[at], torch.arange(len(at), device=self._device)]
+    return batch._replace(action=batch.action.index_copy(0, at, own))
 
   def _update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
     networks, config = self.networks, self._config
@@ -199,13 +177,34 @@ class LfgpLearner:
       )
     with self._autocast():
       q = networks.critics(batch.inputs, batch.action)
-    loss, metrics = critic_loss(q, target)
+    mask = None
+    if batch.owner is not None:  # an example serves its own task alone
+      tasks = torch.arange(len(reward), device=self._device)[:, None]
+      mask = ((batch.owner < 0) | (batch.owner == tasks)).float()
+    loss, metrics = critic_loss(q, target, mask)
+    if config.value_penalty > 0:
+      low, high = self._value_bounds(batch, reward, q[0].detach())
+      penalty, more = value_penalty_loss(
+        q, low, high, config.value_penalty, mask
+      )
+      loss = loss + penalty
+      metrics |= more
     norm = self._step("critic", loss, self._critic_parameters)
     return metrics | {
       "gradient_norm/critic": norm,
       "reward": reward.mean(1),
       "q_bound": reward.abs().amax(1) / (1 - config.discount + 1e-8),
     }
+
+  def _value_bounds(
+    self, batch: Batch, reward: torch.Tensor, q: torch.Tensor
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """The least and greatest possible values, [K, 1] and [K, 1] or [K, B]."""
+    if batch.owner is None:
+      return self._bounds.of_rewards(reward)
+    tasks = torch.arange(len(reward), device=self._device)[:, None]
+    scale = self._config.reward_scale
+    return self._bounds.of_examples(q, batch.owner == tasks, scale)
 
   def _update_intentions(
     self, inputs: torch.Tensor, expert: ExpertBatch | None
@@ -268,16 +267,15 @@ class LfgpLearner:
   ) -> tuple[torch.Tensor, torch.Tensor]:
     return tanh_gaussian.sample(mean, deviation, self._noise(mean))
 
+  def _discriminating(self) -> DiscriminatorLearner:
+    if self._discriminator is None:
+      raise ValueError("this learner has no discriminator")
+    return self._discriminator
+
   def _noise(self, like: torch.Tensor) -> torch.Tensor:
     return torch.randn(
       like.shape, generator=self._generator, device=self._device
     )
-
-  def _disturb(self, inputs: torch.Tensor) -> torch.Tensor:
-    """Adds the discriminator's training noise, if any."""
-    if not self._config.discriminator_noise:
-      return inputs
-    return inputs + self._config.discriminator_noise * self._noise(inputs)
 
   def _autocast(self) -> torch.autocast:
     return torch.autocast(
@@ -285,7 +283,12 @@ class LfgpLearner:
     )
 
   def adopt_intention_trunk(self) -> None:
-    """Copies the intentions' own trunk into critics and targets."""
+    """Copies the intentions' trunk into critics and targets, if it is to be.
+
+    Not if `actor_trunk` is "own": then the critics start from their own.
+    """
+    if self._config.actor_trunk == "own":
+      return
     state = self.networks.intentions.trunk.state_dict()
     self.networks.critics.trunk.load_state_dict(state)
     self.networks.target_critics.trunk.load_state_dict(state)
@@ -306,6 +309,7 @@ class LfgpLearner:
         for name, optimiser in self._optimisers.items()
       },
       "generator": serialisation.torch_generator_state(self._generator),
+      "bounds": self._bounds.state_dict(),
       "updates": self.updates,
     }
 
@@ -326,4 +330,5 @@ class LfgpLearner:
     serialisation.load_torch_generator_state(
       self._generator, state["generator"]
     )
+    self._bounds.load_state_dict(state["bounds"])
     self.updates = int(state["updates"])

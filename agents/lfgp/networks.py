@@ -21,23 +21,24 @@ class LfgpNetworks:
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  discriminator: Discriminator
+  discriminator: Discriminator | None  # None: rewards come from elsewhere
   log_temperature: nn.Parameter  # [K]
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
-    return {
+    modules: dict[str, nn.Module] = {
       "intentions": self.intentions,
       "critics": self.critics,
       "target_critics": self.target_critics,
-      "discriminator": self.discriminator,
     }
+    if self.discriminator is not None:
+      modules["discriminator"] = self.discriminator
+    return modules
 
 
 def make_networks(
   config: LfgpConfig,
   tasks: int,
-  observations: int,
   actions: int,
   standardiser: Standardiser,
   generator: torch.Generator,
@@ -48,17 +49,16 @@ def make_networks(
   Args:
     config: sizes and options.
     tasks: K.
-    observations: O.
     actions: A.
-    standardiser: raw observation -> input.
+    standardiser: raw observation -> input; O is its input size.
     generator: a CPU generator, source of the initial numbers.
     device: where to put the networks.
 
   Returns:
-    The networks. The intentions own their trunk if the config says so, or if
-    a warm start by behaviour cloning has to train it.
+    The networks; see `LfgpConfig.owns_trunk`.
   """
   layout, hidden = config.layout, config.hidden_size
+  observations = standardiser.input_size
   sizes = (tasks, observations, hidden, actions)
   trunk = layouts.make_trunk(layout, observations, hidden, generator)
   critics = CriticNetwork(
@@ -67,19 +67,25 @@ def make_networks(
       layout, *sizes, generator, config.critic_layer_norm
     ),
   ).to(device)
-  owns_trunk = config.actor_trunk == "own" or config.bc_warm_start_updates > 0
   own = trunk
-  if owns_trunk:
+  if config.owns_trunk:
     own = layouts.make_trunk(layout, observations, hidden, generator)
   intentions = IntentionNetwork(
     standardiser,
     own,
     layouts.make_intention_heads(layout, *sizes, generator),
-    owns_trunk,
+    config.owns_trunk,
   ).to(device)
-  discriminator = Discriminator(
-    tasks, observations, actions, hidden, generator, config.discriminator_input
-  ).to(device)
+  discriminator = None
+  if config.reward_source == "discriminator":
+    discriminator = Discriminator(
+      tasks,
+      observations,
+      actions,
+      hidden,
+      generator,
+      config.discriminator_input,
+    ).to(device)
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,

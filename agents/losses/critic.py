@@ -33,21 +33,60 @@ def soft_bellman_target(
 
 
 def critic_loss(
-  q: torch.Tensor, target: torch.Tensor
+  q: torch.Tensor, target: torch.Tensor, mask: torch.Tensor | None = None
 ) -> tuple[torch.Tensor, Metrics]:
   """Squared soft Bellman residual of both critics, without a half.
 
   Args:
     q: [2, K, B].
     target: [K, B], without gradient.
+    mask: [K, B], 1 where a task learns from a row, else 0; None: all 1.
 
   Returns:
     The sum over critics and tasks of the mean over rows, and values by task.
   """
-  loss = (q - target).square().mean(-1).sum()
+  loss = masked_mean((q - target).square(), mask).sum()
   value = q.detach()
   return loss, {
     "loss/critic": loss.detach(),
     "q": value.mean((0, 2)),
     "q_max": value.abs().amax((0, 2)),
   }
+
+
+def value_penalty_loss(
+  q: torch.Tensor,
+  low: torch.Tensor,
+  high: torch.Tensor,
+  weight: float,
+  mask: torch.Tensor | None = None,
+) -> tuple[torch.Tensor, Metrics]:
+  """Penalty for values that no policy could have (the authors' later work).
+
+  weight [max(Q - high, 0)^2 + max(low - Q, 0)^2], summed and averaged as the
+  critics' loss that it is added to.
+
+  Args:
+    q: [2, K, B].
+    low: [K, 1], the least possible value.
+    high: [K, 1] or [K, B], the greatest.
+    weight: the later paper's lambda.
+    mask: as in `critic_loss`.
+
+  Returns:
+    The loss, and the mean bounds by task.
+  """
+  excess = torch.relu(q - high).square() + torch.relu(low - q).square()
+  loss = weight * masked_mean(excess, mask).sum()
+  return loss, {
+    "loss/value_penalty": loss.detach(),
+    "value_low": low.mean(-1),
+    "value_high": high.mean(-1),
+  }
+
+
+def masked_mean(value: torch.Tensor, mask: torch.Tensor | None) -> torch.Tensor:
+  """The mean over the last axis of the rows that the mask lets pass."""
+  if mask is None:
+    return value.mean(-1)
+  return (value * mask).sum(-1) / mask.sum(-1)

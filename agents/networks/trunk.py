@@ -3,23 +3,30 @@
 import numpy as np
 import torch
 from torch import nn
+from torch.nn import functional
 
 from agents.networks.linear import make_linear
 
 
 class Standardiser(nn.Module):
-  """Maps raw observations to network inputs: (x - mean) / deviation."""
+  """Maps raw observations to network inputs: (x - mean) / deviation.
+
+  With the absorbing flag of the released code's wrapper, a 0 comes last: its
+  episodes end by time alone, so that no state is ever absorbing.
+  """
 
   mean: torch.Tensor
   deviation: torch.Tensor
 
-  def __init__(self, size: int):
+  def __init__(self, size: int, absorbing_flag: bool = False):
     """Starts as the identity.
 
     Args:
       size: O, floats of an observation.
+      absorbing_flag: whether inputs get one more float, 0.
     """
     super().__init__()
+    self.absorbing_flag = absorbing_flag
     self.register_buffer("mean", torch.zeros(size))
     self.register_buffer("deviation", torch.ones(size))
 
@@ -37,8 +44,16 @@ class Standardiser(nn.Module):
     self.deviation.copy_(torch.from_numpy(deviation))
 
   def forward(self, observation: torch.Tensor) -> torch.Tensor:
-    """Returns standardised [..., O]."""
-    return (observation - self.mean) / self.deviation
+    """Returns standardised [..., O], or [..., O + 1] with the flag."""
+    inputs = (observation - self.mean) / self.deviation
+    if self.absorbing_flag:
+      inputs = functional.pad(inputs, (0, 1))
+    return inputs
+
+  @property
+  def input_size(self) -> int:
+    """Floats that a network gets: O, or O + 1."""
+    return self.mean.shape[0] + self.absorbing_flag
 
 
 class Trunk(nn.Module):

@@ -60,7 +60,7 @@ class LfgpConfigTest(parameterized.TestCase):
       LfgpConfig(batch_size=0, xi=-1)
 
   def test_unknown_name_is_refused_with_the_valid_ones(self):
-    with self.assertRaisesRegex(ValueError, "no gama; valid: actor_trunk"):
+    with self.assertRaisesRegex(ValueError, "no gama; valid: absorbing_flag"):
       LfgpConfig.from_mapping({"gama": 0.9})
 
   def test_every_field_is_checked(self):
