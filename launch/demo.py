@@ -50,7 +50,7 @@ def main() -> int:
   path = pathlib.Path(_RUN.value) if _RUN.value else _default_path(config)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
   progress = training.train(config, path)
-  if progress.env_step < config.env_steps:
+  if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
   rows = evaluation.read_csv(path / "evaluation.csv")

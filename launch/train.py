@@ -40,14 +40,16 @@ def report(
   config: configs.RunConfig, path: pathlib.Path, progress: loop.Progress
 ) -> int:
   """Prints the last evaluation and the places; returns the exit status."""
-  if progress.env_step < config.env_steps:
+  if not progress.is_complete:
     print(
-      f"stopped at step {progress.env_step} of {config.env_steps}; continue: "
+      f"stopped at {progress.env_step} of {config.env_steps}; continue: "
       f"python launch/train.py --run={path} --resume"
     )
     return command.INTERRUPTED
   rows = evaluation.read_csv(path / "evaluation.csv")
-  print(f"\nsuccess after {progress.env_step} environment steps:")
+  is_supervised = configs.ALGORITHMS[config.algorithm].is_supervised
+  unit = "updates" if is_supervised else "environment steps"
+  print(f"\nsuccess after {progress.env_step} {unit}:")
   last = max(row.env_step for row in rows)
   print(evaluation.success_table([row for row in rows if row.env_step == last]))
   print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")

@@ -20,6 +20,7 @@ from lfgp_dmc import (
   resuming,
   run_folder,
   seeding,
+  supervised,
   task_names,
 )
 from lfgp_dmc.demonstrations import Demonstrations
@@ -165,15 +166,9 @@ class _Run:
     self._config, self._run, self._tasks = config, run, tasks
     self._environment = environment
     widths = environments.widths(environment)
-    # A full ring must still hold the rows of the last checkpoint.
-    episode = getattr(config.agent, "episode_steps", 0)
-    is_ring = config.replay_capacity < config.env_steps
-    self._replay = Replay(
-      config.replay_capacity,
-      *widths,
-      run.replay,
-      slack=config.checkpoint_every + 2 * episode if is_ring else 0,
-    )
+    self._replay = None
+    if not ALGORITHMS[config.algorithm].is_supervised:
+      self._replay = _open_replay(config, run, widths)
     self._agent = _build_agent(
       config, tasks, shown, self._replay, device, widths
     )
@@ -190,12 +185,22 @@ class _Run:
     """Runs the loop to its end or to a signal."""
     self._progress_bar = progress_bar
     self._save_policy(self._progress.env_step)
+    schedule = _schedule(self._config, progress_bar)
     try:
+      if self._replay is None:
+        return supervised.train(
+          self._agent,
+          schedule,
+          self._log,
+          self._evaluate,
+          self._checkpoint,
+          progress=self._progress,
+        )
       return loop.train(
         self._environment,
         self._agent,
         self._replay,
-        _schedule(self._config, progress_bar),
+        schedule,
         self._log,
         self._evaluate,
         self._checkpoint,
@@ -224,6 +229,20 @@ class _Run:
     _write_policy(self._run.path, self._config, self._agent, env_step)
 
 
+def _open_replay(
+  config: RunConfig, run: RunFolder, widths: tuple[int, int]
+) -> Replay:
+  # A full ring must still hold the rows of the last checkpoint.
+  episode = getattr(config.agent, "episode_steps", 0)
+  is_ring = config.replay_capacity < config.env_steps
+  return Replay(
+    config.replay_capacity,
+    *widths,
+    run.replay,
+    slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+  )
+
+
 def _build_agent(config, tasks, shown, replay, device, widths):
   return ALGORITHMS[config.algorithm].build(
     config.agent,
@@ -249,13 +268,16 @@ def _write_policy(
 
 
 def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
+  pace = {}
+  if not ALGORITHMS[config.algorithm].is_supervised:
+    pace["warmup_steps"] = config.agent.warm_up
+    pace["updates_per_step"] = config.agent.updates_per_step
   return loop.TrainSchedule(
     env_steps=config.env_steps,
     log_every=config.log_every,
     evaluate_every=config.evaluate_every,
     checkpoint_every=config.checkpoint_every,
-    warmup_steps=config.agent.warm_up,
-    updates_per_step=config.agent.updates_per_step,
     evaluate_first=config.evaluate_first,
     progress_bar=progress_bar,
+    **pace,
   )

@@ -58,6 +58,7 @@ class Progress:
   physics_failures: int = 0  # episodes dropped
   wall_s: float = 0.0
   update_credit: float = 0.0  # the fraction of an update that is due
+  is_complete: bool = False  # reached its end, which may come early in BC
 
 
 EvaluateFn = Callable[[int], Mapping[str, float]]
@@ -95,7 +96,7 @@ def train(
     progress: of the checkpoint that is being resumed.
 
   Returns:
-    The progress; `env_step` below `schedule.env_steps` tells it was stopped.
+    The progress; `is_complete` tells whether it was stopped.
   """
   loop = _Loop(environment, agent, replay, schedule, log, seed, progress)
   with stop_request() as stop:
@@ -131,6 +132,7 @@ class _Loop:
   ) -> None:
     """Plays episodes; evaluates and checkpoints between them."""
     schedule, progress = self._schedule, self.progress
+    progress.is_complete = progress.env_step >= schedule.env_steps
     self._agent.prepare(schedule.progress_bar)
     self._bar = tqdm.tqdm(
       total=schedule.env_steps,
@@ -146,12 +148,13 @@ class _Loop:
         before = progress.env_step
         self._play_episode()
         step, final = progress.env_step, progress.env_step == schedule.env_steps
+        progress.is_complete = final
         if final and step % schedule.log_every:
           self._write_row()
-        due = final or _passed(before, step, schedule.evaluate_every)
+        due = final or passed(before, step, schedule.evaluate_every)
         if due and evaluate_fn:
           self._evaluate(evaluate_fn)
-        due = final or _passed(before, step, schedule.checkpoint_every)
+        due = final or passed(before, step, schedule.checkpoint_every)
         if (due or stop) and checkpoint_fn:
           progress.wall_s = self._elapsed()
           checkpoint_fn(progress)
@@ -247,7 +250,7 @@ class _Loop:
     return time.monotonic() - self._start
 
 
-def _passed(before: int, now: int, every: int) -> bool:
+def passed(before: int, now: int, every: int) -> bool:
   """Whether a multiple of `every` lies in (before, now]."""
   return before // every != now // every
 

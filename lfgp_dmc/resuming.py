@@ -5,6 +5,8 @@ kill between the two leaves a replay that is ahead, and it is rewound.
 """
 
 import dataclasses
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 from absl import logging
 
@@ -13,39 +15,49 @@ from lfgp_dmc.loop import Progress
 from lfgp_dmc.metrics import MetricsLog
 from lfgp_dmc.replay import Replay
 from lfgp_dmc.run_folder import RunFolder
-from lfgp_dmc.types import Agent
+
+
+class Resumable(Protocol):
+  """What a checkpoint needs of an agent."""
+
+  def state_dict(self) -> dict[str, Any]:
+    """Arrays and JSON-able values: everything but the replay."""
+
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned."""
 
 
 def save(
   run: RunFolder,
-  agent: Agent,
-  replay: Replay,
+  agent: Resumable,
+  replay: Replay | None,
   progress: Progress,
   run_steps: int | None = None,
 ) -> None:
-  """Writes a checkpoint at an episode's end.
+  """Writes a checkpoint at an episode's or epoch's end.
 
   Args:
     run: the run's folder.
     agent: gives its `state_dict`.
-    replay: flushed; a replay in memory is not stored.
+    replay: flushed; a replay in memory is not stored. None: there is none.
     progress: the loop's counters.
     run_steps: length of the whole run, for which checkpoints are kept.
 
   Raises:
     OSError: it could not be written; earlier checkpoints are untouched.
   """
-  replay.flush()
+  if replay is not None:
+    replay.flush()
   state = {
     "agent": agent.state_dict(),
     "progress": dataclasses.asdict(progress),
-    "replay_total": replay.total,
+    "replay_total": 0 if replay is None else replay.total,
   }
   checkpoints.save(run.checkpoints, progress.env_step, state, run_steps)
 
 
 def restore(
-  run: RunFolder, agent: Agent, replay: Replay, log: MetricsLog
+  run: RunFolder, agent: Resumable, replay: Replay | None, log: MetricsLog
 ) -> Progress:
   """Goes back to the newest good checkpoint, or to the start without one.
 
@@ -55,7 +67,7 @@ def restore(
   Args:
     run: the run's folder.
     agent: freshly built; gets `load_state_dict`.
-    replay: opened from the run's folder.
+    replay: opened from the run's folder; None: there is none.
     log: the run's metrics.
 
   Returns:
@@ -71,11 +83,16 @@ def restore(
     progress = Progress(**state["progress"])
     replay_total, last_step = state["replay_total"], progress.env_step
     logging.info("resuming from %s", path)
-  try:
-    replay.rewind(replay_total)
-  except ValueError as error:
-    logging.warning("%s; refilling the replay before further updates", error)
-    replay.clear()
+  if replay is not None:
+    _rewind(replay, replay_total)
   log.truncate_after(last_step)
   csv_files.truncate_after(run.evaluation, last_step)
   return progress
+
+
+def _rewind(replay: Replay, total: int) -> None:
+  try:
+    replay.rewind(total)
+  except ValueError as error:
+    logging.warning("%s; refilling the replay before further updates", error)
+    replay.clear()

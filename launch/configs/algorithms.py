@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import lfgp_dmc
-from agents import lfgp
+from agents import bc, lfgp
+from agents.bc import BcAgent, BcConfig
 from agents.lfgp import LfgpAgent, LfgpConfig
 
 # `move_object` is the paper's pre-training task for transfer.
@@ -18,9 +19,11 @@ class Algorithm:
 
   summary: str
   agent_config: type  # a frozen dataclass with defaults for every field
-  build: Callable[..., LfgpAgent]  # see `agents.lfgp.build`
+  build: Callable[..., LfgpAgent | BcAgent]  # see `agents.lfgp.build`
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
   is_multitask: bool = True  # learns all of `task_set`, or the main task alone
+  is_supervised: bool = False  # by `lfgp_dmc/supervised.py`, without acting
+  run_defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
   def make_agent_config(self) -> Any:
     """The agent's config with this algorithm's defaults."""
@@ -45,5 +48,29 @@ ALGORITHMS: dict[str, Algorithm] = {
     lfgp.build,
     defaults={"scheduler": "main_only", "layout": "separate"},
     is_multitask=False,
+  ),
+  "bc": Algorithm(
+    "behaviour cloning of the main task alone",
+    BcConfig,
+    bc.build,
+    defaults={"layout": "separate"},
+    is_multitask=False,
+    is_supervised=True,
+  ),
+  "bc_less": Algorithm(
+    "the same with less data: a multitask method's pairs of the main task",
+    BcConfig,
+    bc.build,
+    defaults={"layout": "separate"},
+    is_multitask=False,
+    is_supervised=True,
+    run_defaults={"pairs_per_task": 9000},
+  ),
+  "multitask_bc": Algorithm(
+    "behaviour cloning of all tasks, with a shared trunk",
+    BcConfig,
+    bc.build,
+    defaults={"layout": "shared_trunk"},
+    is_supervised=True,
   ),
 }

@@ -30,7 +30,8 @@ def make_config(
     if name not in valid:
       raise ValueError(f"unknown {what} {name!r}; valid: {', '.join(valid)}")
   agent = ALGORITHMS[algorithm].make_agent_config()
-  run = RunConfig(algorithm=algorithm, agent=agent)
+  own = ALGORITHMS[algorithm].run_defaults
+  run = RunConfig(algorithm=algorithm, agent=agent, **own)
   config = ml_collections.ConfigDict(dataclasses.asdict(run)).lock()
   changes = dict(PRESETS[preset])
   # What makes the algorithm itself is not the preset's to change.

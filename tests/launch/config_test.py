@@ -99,7 +99,8 @@ class FlagfilesTest(parameterized.TestCase):
     self.assertIn(f"--output={config.demonstrations}", text)
 
   @parameterized.product(
-    algorithm=["lfgp", "lfgp_ns", "dac"], main_task=task_names.MAIN_TASKS
+    algorithm=["lfgp", "lfgp_ns", "dac", "bc", "bc_less", "multitask_bc"],
+    main_task=task_names.MAIN_TASKS,
   )
   def test_is_named_after_algorithm_and_main_task(self, algorithm, main_task):
     path = _FLAGS / f"{algorithm}_{main_task}.flags"
