@@ -18,6 +18,10 @@ _TOPPLED = math.radians(7.0)
 _LEAST_GRIP = 0.002  # m, TCP over the centre of a block gripped for the slot
 _ASKEW_ON_FLOOR = math.radians(1.4)
 _ASKEW_IN_AIR = math.radians(4.0)
+_PARK_X, _PARK_Y = (
+  0.04,
+  0.07,
+)  # m from the middle, on the side that green is not
 _PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
 
 
@@ -83,9 +87,12 @@ def _insert_held(view: View, away: float) -> Command:
 
 
 def _park_blue(view: View) -> Command:
-  """Sets blue down flat, away from green and from the slots."""
-  y = ws.CENTRE_XY[1] + math.copysign(0.05, ws.CENTRE_XY[1] - view.green.y)
-  return place.set_down(view, view.blue, (0.0, y))
+  """Sets blue down flat, off the slots, with room for the fingers."""
+  spot = (
+    -math.copysign(_PARK_X, view.green.x),
+    ws.CENTRE_XY[1] - math.copysign(_PARK_Y, view.green.y - ws.CENTRE_XY[1]),
+  )
+  return place.set_down(view, view.blue, spot)
 
 
 def _press(view: View) -> Command:
