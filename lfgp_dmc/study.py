@@ -85,7 +85,9 @@ def method_of(config: Mapping[str, Any]) -> str:
   algorithm = str(config.get("algorithm", "?"))
   agent = config.get("agent")
   fields = {**config, **(agent if isinstance(agent, Mapping) else {})}
-  if any("transfer" in name and value for name, value in fields.items()):
+  # The run or folder it starts from, not numbers such as transfer_updates.
+  if any("transfer" in k and v and isinstance(v, str)
+         for k, v in fields.items()):  # fmt: skip
     return f"{algorithm}_transfer"
   shown = config.get("demonstrations")
   if shown and _is_play(pathlib.Path(str(shown))):

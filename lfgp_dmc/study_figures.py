@@ -91,7 +91,7 @@ def draw(
     line
     for row, row_keys in zip(grid, keys, strict=True)
     for panel, key in zip(row, row_keys, strict=True)
-    for line in _table(panel, *key, kind)
+    for line in _table(panel, key[0], key[1], kind)
   ]
   csv_files.write(output.with_suffix(".csv"), COLUMNS, rows)
   return _notes(plan, runs)

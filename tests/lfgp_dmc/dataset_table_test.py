@@ -19,8 +19,14 @@ def _write(folder, main_task, tasks, pairs, collection="reset"):
     np.zeros(pairs, bool),
   )
   for task in tasks:
-    attributes = {"task": task, "main_task": main_task, "expert": "none",
-                  "collection": collection, "seed": 0, "control_hz": 20}  # fmt: skip
+    attributes = {
+      "task": task,
+      "main_task": main_task,
+      "collection": collection,
+      "expert": "none",
+      "seed": 0,
+      "control_hz": 20,
+    }
     demonstrations.write(folder / f"{task}.hdf5", data, attributes)
   return dataset_table.read(folder)
 

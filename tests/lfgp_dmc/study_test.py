@@ -87,7 +87,7 @@ class StudyTest(parameterized.TestCase):
     ("lfgp_play", {"demonstrations": "data/stack_play"}),
     ("lfgp_transfer", {"transfer_from": "runs/a"}),
     ("lfgp_transfer", {"agent": {"transfer_run": "runs/a"}}),
-    ("lfgp", {"agent": {"transfer_run": ""}}),
+    ("lfgp", {"agent": {"transfer_run": "", "transfer_updates": 1000}}),
   )
   def test_the_method_follows_from_the_config(self, method, config):
     self.assertEqual(study.method_of({"algorithm": "lfgp", **config}), method)

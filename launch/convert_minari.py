@@ -1,0 +1,81 @@
+"""Converts demonstrations to Minari and back; needs the extra `minari`.
+
+  python launch/convert_minari.py --dataset=data/stack_reset \
+      --minari=lfgp_dmc/stack_reset
+  python launch/convert_minari.py --minari=lfgp_dmc/stack_reset --back \
+      --dataset=data/from_minari
+
+A dataset folder becomes one Minari dataset a task, `ID/TASK-v0`. The way back
+takes all local ones under `ID/`; of others' datasets --attributes says what our
+files need: --attributes=task=stack,expert=human,...
+"""
+
+import pathlib
+
+from absl import flags
+
+from launch import command
+from launch.command import UserError
+from lfgp_dmc import demonstrations
+
+_DATASET = flags.DEFINE_string("dataset", "", "Our dataset folder.")
+_MINARI = flags.DEFINE_string("minari", "", "Minari's namespace for it.")
+_BACK = flags.DEFINE_bool("back", False, "From Minari to a new folder.")
+_ATTRIBUTES = flags.DEFINE_list(
+  "attributes", [], "name=value pairs that go over those in Minari."
+)
+
+_NUMBERS = ("seed", "control_hz")
+
+
+def main() -> None:
+  """Converts every task, and prints what it wrote."""
+  if not _DATASET.value or not _MINARI.value:
+    raise UserError("give --dataset=FOLDER and --minari=NAMESPACE")
+  try:
+    import minari
+
+    from lfgp_dmc import minari_datasets
+  except ImportError as error:
+    raise UserError(f"{error}; pip install 'lfgp-dmc[minari]'") from None
+  folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"
+  with command.checked_input():
+    if not _BACK.value:
+      for path in _files(folder):
+        name = f"{prefix}{path.stem}-v0"
+        minari_datasets.to_minari(demonstrations.read(path), name)
+        print(name)
+      return
+    names = [n for n in sorted(minari.list_local_datasets())
+             if n.startswith(prefix)]  # fmt: skip
+    if not names:
+      raise UserError(f"no local Minari dataset starts with {prefix}")
+    found = [minari_datasets.from_minari(n, _attributes()) for n in names]
+    demonstrations.create_folder(folder)
+    for name, data in zip(names, found, strict=True):
+      stem = name.removeprefix(prefix).rpartition("-v")[0]
+      task = str(data.attributes.get("task", stem))
+      path = folder / (task + demonstrations.SUFFIX)
+      demonstrations.write(path, data, {"task": task, **data.attributes})
+      print(path)
+
+
+def _files(folder: pathlib.Path) -> list[pathlib.Path]:
+  found = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
+  if not found:
+    raise UserError(f"no dataset in {folder}")
+  return found
+
+
+def _attributes() -> dict[str, str | int]:
+  values: dict[str, str | int] = {}
+  for pair in _ATTRIBUTES.value:
+    name, equals, value = pair.partition("=")
+    if not equals:
+      raise UserError(f"--attributes={pair}; valid: name=value,...")
+    values[name] = int(value) if name in _NUMBERS else value
+  return values
+
+
+if __name__ == "__main__":
+  command.run(main)

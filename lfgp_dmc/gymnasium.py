@@ -1,0 +1,31 @@
+"""Registers the nine tasks with Gymnasium; needs the extra `gymnasium`.
+
+    import gymnasium
+    import lfgp_dmc.gymnasium
+
+    env = gymnasium.make("lfgp_dmc/UnstackStack-v0", reward="dense")
+    observation, info = env.reset(seed=0)
+
+`gymnasium.make("lfgp_dmc.gymnasium:lfgp_dmc/Stack-v0")` needs no second import.
+Options are those of `lfgp_dmc.load`. What the environments give is told in
+`tasks/gymnasium_environment.py`; nothing of that is loaded before it is made.
+"""
+
+import gymnasium
+
+from lfgp_dmc.task_names import ALL_TASKS
+
+NAMESPACE = "lfgp_dmc"
+_MAKE = "tasks.gymnasium_environment:make"
+
+
+def environment_id(task: str) -> str:
+  """Such as "lfgp_dmc/UnstackStack-v0" of "unstack_stack"."""
+  name = "".join(word.capitalize() for word in task.split("_"))
+  return f"{NAMESPACE}/{name}-v0"
+
+
+for _task in ALL_TASKS:
+  gymnasium.register(
+    environment_id(_task), entry_point=_MAKE, kwargs={"task": _task}
+  )

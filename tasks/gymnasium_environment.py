@@ -1,0 +1,124 @@
+"""A block task as a Gymnasium environment, by way of shimmy.
+
+Observations are the 59 floats that every policy of this project takes, a box
+float32 [59]; with `observations="vision"` a dictionary of what is observed.
+What belongs to tasks is in `info` instead:
+  `is_success`: whether the loaded task has succeeded in this episode;
+  `successes`, `conditions`: task -> bool for all nine, see `lfgp_dmc`;
+  `physics_failure`: whether the simulation broke; such an episode is truncated.
+
+Episodes are truncated at their time limit and never terminate: success does not
+end them. `reset(seed=...)` makes what follows depend on the seed alone.
+"""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+import lfgp_dmc
+from lfgp_dmc import graphics
+from lfgp_dmc.environments import REWARD_PREFIX
+from lfgp_dmc.observations import (
+  CONDITION_PREFIX,
+  OBSERVATION_SIZE,
+  SUCCESS_PREFIX,
+)
+
+graphics.choose_backend()  # before shimmy imports MuJoCo
+
+from shimmy import DmControlCompatibilityV0  # noqa: E402
+
+_TASK_PREFIXES = (SUCCESS_PREFIX, CONDITION_PREFIX, REWARD_PREFIX)
+_FIXED_RENDERING = {"height": 480, "width": 640, "camera_id": "three_quarter"}
+
+
+def make(
+  task: str, render_mode: str | None = None, **options: Any
+) -> "BlockEnvironment":
+  """What `gymnasium.make("lfgp_dmc/...")` calls.
+
+  Args:
+    task: one of the nine.
+    render_mode: None, "rgb_array" or "depth_array".
+    **options: of `lfgp_dmc.load`; `render_kwargs` chooses height, width and
+      camera_id of pictures.
+  """
+  return BlockEnvironment(task, render_mode, **options)
+
+
+class BlockEnvironment(DmControlCompatibilityV0):
+  """A Composer environment of this project for Gymnasium."""
+
+  def __init__(
+    self,
+    task: str,
+    render_mode: str | None = None,
+    render_kwargs: dict[str, Any] | None = None,
+    **options: Any,
+  ):
+    """Builds the environment; see `make`."""
+    self.task_name, self._is_closed = task, False
+    self.metadata = {
+      "render_modes": ["rgb_array", "depth_array"],
+      "render_fps": options.get("control_hz", 20),
+    }
+    frames_a_second = self.metadata["render_fps"]
+    super().__init__(
+      lfgp_dmc.load(task, **options),
+      render_mode,
+      {**_FIXED_RENDERING, **(render_kwargs or {})},
+    )
+    self.metadata["render_fps"] = frames_a_second  # shimmy's is 1000 times dt
+    self._is_flat = options.get("observations", "features") == "features"
+    if self._is_flat:
+      self.observation_space = gymnasium.spaces.Box(
+        -np.inf, np.inf, (OBSERVATION_SIZE,), np.float32
+      )
+    else:
+      self.observation_space = gymnasium.spaces.Dict(
+        _without_tasks(self.observation_space.spaces)
+      )
+
+  def reset(
+    self, *, seed: int | None = None, options: dict[str, Any] | None = None
+  ) -> tuple[Any, dict[str, Any]]:
+    """Starts an episode; `options` may name the starts of `reset_to`."""
+    gymnasium.Env.reset(self, seed=seed)
+    if seed is not None:
+      self._env.reseed(seed)
+    start = self._env.reset_to if options else self._env.reset
+    timestep = start(**(options or {}))
+    return self._observed(timestep.observation), self._info(timestep)
+
+  def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
+    """One control step of 50 ms (at 20 Hz)."""
+    timestep = self._env.step(action)
+    observation = self._observed(timestep.observation)
+    is_over = bool(timestep.last())
+    info = self._info(timestep)
+    return observation, float(timestep.reward), False, is_over, info
+
+  def close(self) -> None:
+    """Frees the simulator."""
+    if not self._is_closed:
+      self._env.close()
+    self._is_closed = True
+
+  def _observed(self, observation) -> Any:
+    if self._is_flat:
+      return lfgp_dmc.flatten(observation)
+    return {k: np.asarray(v) for k, v in _without_tasks(observation).items()}
+
+  def _info(self, timestep) -> dict[str, Any]:
+    successes = lfgp_dmc.successes(timestep.observation)
+    return {
+      "is_success": successes[self.task_name],
+      "successes": successes,
+      "conditions": lfgp_dmc.conditions(timestep.observation),
+      "physics_failure": bool(timestep.last() and timestep.discount == 0),
+    }
+
+
+def _without_tasks(named) -> dict[str, Any]:
+  return {k: v for k, v in named.items() if not k.startswith(_TASK_PREFIXES)}

@@ -1,0 +1,117 @@
+"""The nine tasks through Gymnasium, by Gymnasium's own checker."""
+
+import importlib.util
+import unittest
+import warnings
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+import lfgp_dmc
+from lfgp_dmc import graphics
+
+if not all(map(importlib.util.find_spec, ("gymnasium", "shimmy"))):
+  raise unittest.SkipTest("the extra gymnasium is not installed")
+
+import gymnasium
+from gymnasium.utils import env_checker
+
+import lfgp_dmc.gymnasium
+
+_IDS = {
+  "stack": "lfgp_dmc/Stack-v0",
+  "unstack_stack": "lfgp_dmc/UnstackStack-v0",
+  "bring": "lfgp_dmc/Bring-v0",
+  "insert": "lfgp_dmc/Insert-v0",
+  "open_gripper": "lfgp_dmc/OpenGripper-v0",
+  "close_gripper": "lfgp_dmc/CloseGripper-v0",
+  "reach": "lfgp_dmc/Reach-v0",
+  "lift": "lfgp_dmc/Lift-v0",
+  "move_object": "lfgp_dmc/MoveObject-v0",
+}
+
+
+class GymnasiumTest(parameterized.TestCase):
+  @parameterized.parameters(*_IDS.items())
+  def test_passes_gymnasiums_checker(self, task, name):
+    env = gymnasium.make(name)
+    self.assertEqual(env.unwrapped.task_name, task)
+    with warnings.catch_warnings():
+      warnings.simplefilter("error")
+      # The 59 floats have no bounds, on purpose.
+      warnings.filterwarnings("ignore", message=".*-?infinity.*")
+      env_checker.check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+
+  def test_plays_as_the_environment_itself_does(self):
+    env = gymnasium.make(_IDS["stack"], reward="dense", time_limit=1.0)
+    own = lfgp_dmc.load("stack", seed=5, reward="dense", time_limit=1.0)
+    observation, info = env.reset(seed=5)
+    timestep = own.reset()
+    random = np.random.default_rng(0)
+    for step in range(20):
+      np.testing.assert_array_equal(
+        observation, lfgp_dmc.flatten(timestep.observation)
+      )
+      self.assertEqual(
+        info["successes"], lfgp_dmc.successes(timestep.observation)
+      )
+      action = random.uniform(-1, 1, 4).astype(np.float32)
+      observation, reward, terminated, truncated, info = env.step(action)
+      timestep = own.step(action)
+      self.assertEqual(reward, timestep.reward)
+      self.assertFalse(terminated)
+      self.assertEqual(truncated, step == 19)
+    self.assertFalse(info["is_success"])
+    self.assertFalse(info["physics_failure"])
+    # The next episode goes on from the random state; the seed starts again.
+    again = [env.reset()[0] for _ in range(2)]
+    self.assertFalse(np.array_equal(*again))
+    first = [env.reset(seed=9)[0] for _ in range(2)]
+    np.testing.assert_array_equal(*first)
+    env.close()
+
+  def test_success_is_told_and_does_not_end_the_episode(self):
+    env = gymnasium.make(_IDS["reach"])
+    blue = np.array([0.0, 0.5, 0.145, 1, 0, 0, 0])
+    _, info = env.reset(options={"blue": blue, "tcp": blue[:3]})
+    self.assertFalse(info["is_success"])
+    for _ in range(15):
+      _, _, terminated, truncated, info = env.step(np.zeros(4, np.float32))
+    self.assertTrue(info["is_success"])
+    self.assertTrue(info["conditions"]["reach"])
+    self.assertFalse(terminated or truncated)
+    env.close()
+
+  def test_makes_pictures(self):
+    if graphics.fault():
+      self.skipTest(graphics.fault())
+    size = {"height": 60, "width": 80}
+    env = gymnasium.make(
+      _IDS["bring"], render_mode="rgb_array", render_kwargs=size
+    )
+    env.reset(seed=0)
+    self.assertEqual(env.render().shape, (60, 80, 3))
+    self.assertEqual(env.metadata["render_fps"], 20)
+    env.close()
+    env = gymnasium.make(_IDS["bring"], observations="vision")
+    observation, _ = env.reset(seed=0)
+    self.assertTrue(env.observation_space.contains(observation))
+    self.assertEqual(observation["camera/front"].shape, (84, 84, 3))
+    self.assertFalse([k for k in observation if k.startswith("success/")])
+    env.close()
+
+  def test_vectorises(self):
+    envs = gymnasium.make_vec(
+      _IDS["stack"], 2, vectorization_mode="sync", time_limit=0.1
+    )
+    observation, info = envs.reset(seed=3)
+    self.assertEqual(observation.shape, (2, 59))
+    for _ in range(3):
+      *_, info = envs.step(envs.action_space.sample())
+    self.assertEqual(info["is_success"].shape, (2,))
+    envs.close()
+
+
+if __name__ == "__main__":
+  absltest.main()
