@@ -88,17 +88,18 @@ def from_minari(
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")
+  observation, action, after = (
+    np.concatenate(parts).astype(np.float32)
+    for parts in zip(*map(_pairs, episodes), strict=True)
+  )
+  lengths = [len(one.actions) for one in episodes]
   return Demonstrations(
-    *(
-      np.concatenate(parts).astype(np.float32)
-      for parts in zip(*map(_pairs, episodes), strict=True)
-    ),
-    np.repeat(
-      np.arange(len(episodes), dtype=np.int32),
-      [len(one.actions) for one in episodes],
-    ),
-    np.concatenate([_success(one) for one in episodes]),
-    {**json.loads(str(stored)), **(attributes or {})},
+    observation,
+    action,
+    after,
+    episode=np.repeat(np.arange(len(episodes), dtype=np.int32), lengths),
+    is_last=np.concatenate([_success(one) for one in episodes]),
+    attributes={**json.loads(str(stored)), **(attributes or {})},
   )
 
 

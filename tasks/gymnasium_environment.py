@@ -71,14 +71,7 @@ class BlockEnvironment(DmControlCompatibilityV0):
     )
     self.metadata["render_fps"] = frames_a_second  # shimmy's is 1000 times dt
     self._is_flat = options.get("observations", "features") == "features"
-    if self._is_flat:
-      self.observation_space = gymnasium.spaces.Box(
-        -np.inf, np.inf, (OBSERVATION_SIZE,), np.float32
-      )
-    else:
-      self.observation_space = gymnasium.spaces.Dict(
-        _without_tasks(self.observation_space.spaces)
-      )
+    self.observation_space = self._space(self.observation_space)
 
   def reset(
     self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -104,6 +97,12 @@ class BlockEnvironment(DmControlCompatibilityV0):
     if not self._is_closed:
       self._env.close()
     self._is_closed = True
+
+  def _space(self, everything) -> gymnasium.Space:
+    if self._is_flat:
+      size = (OBSERVATION_SIZE,)
+      return gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
+    return gymnasium.spaces.Dict(_without_tasks(everything.spaces))
 
   def _observed(self, observation) -> Any:
     if self._is_flat:
