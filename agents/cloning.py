@@ -58,9 +58,14 @@ class IntentionCloner:
       The metrics of `behaviour_cloning_loss`.
     """
     loss, metrics = self.loss(batch)
-    clipped_step(
-      self._optimiser, loss, self._parameters, self._max_gradient_norm
-    )
+    if math.isinf(self._max_gradient_norm):
+      self._optimiser.zero_grad()
+      loss.backward()
+      self._optimiser.step()
+    else:
+      clipped_step(
+        self._optimiser, loss, self._parameters, self._max_gradient_norm
+      )
     return metrics
 
   def state_dict(self) -> dict[str, Any]:

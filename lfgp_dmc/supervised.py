@@ -107,8 +107,6 @@ class _Supervised:
         before = progress.update
         self._run_epoch()
         update, final = progress.update, progress.is_complete
-        if final and update % schedule.log_every:
-          self._write_row()
         due = final or passed(before, update, schedule.evaluate_every)
         if due and evaluate_fn:
           self._evaluate(evaluate_fn)
@@ -118,20 +116,26 @@ class _Supervised:
           checkpoint_fn(progress)
 
   def _run_epoch(self) -> None:
-    """Makes the updates of one epoch, or those that the run has left."""
+    """Makes the updates of one epoch, or those that the run has left.
+
+    A row that is due on the last of them tells the epoch's own validation.
+    """
     progress, schedule = self.progress, self._schedule
-    left = schedule.env_steps - progress.update
-    for _ in range(min(self._learner.begin_epoch(), left)):
+    updates = self._learner.begin_epoch()
+    end = min(progress.update + updates, schedule.env_steps)
+    while progress.update < end:
       self._learner.update()
       progress.update += 1
       progress.env_step = progress.update
       self._bar.update()
-      if progress.update % schedule.log_every == 0:
+      if progress.update < end and progress.update % schedule.log_every == 0:
         self._write_row()
     self._learner.end_epoch()
     progress.is_complete = (
       self._learner.has_converged or progress.update >= schedule.env_steps
     )
+    if progress.is_complete or progress.update % schedule.log_every == 0:
+      self._write_row()
 
   def _write_row(self) -> None:
     now, update = self._elapsed(), self.progress.update

@@ -1,0 +1,247 @@
+"""Behaviour cloning: the split, the loss by hand, early stop, best weights."""
+
+import json
+
+import numpy as np
+import torch
+from absl.testing import absltest, parameterized
+
+from agents import synthetic
+from agents.bc import BcConfig, build
+from agents.bc.pairs import SplitPairs
+from agents.policy import Policy
+from lfgp_dmc import nested
+
+TASKS = ("stack", "reach", "lift")
+OBS, A = 10, 4
+
+
+def _build(tasks=TASKS, pairs=100, seed=0, **fields):
+  settings = {
+    "hidden_size": 32,
+    "batch_size": 16,
+    "layout": "separate" if len(tasks) == 1 else "shared_trunk",
+    "learning_rate": 3e-3,
+  }
+  return build(
+    BcConfig(**(settings | fields)),
+    tasks,
+    synthetic.demonstrations(tasks, pairs, OBS, A),
+    None,
+    seed,
+    "cpu",
+    OBS,
+    A,
+  )
+
+
+def _epoch(agent):
+  updates = agent.begin_epoch()
+  for _ in range(updates):
+    agent.update()
+  agent.end_epoch()
+  return updates
+
+
+class SplitTest(parameterized.TestCase):
+  def _pairs(self, sizes, share=0.3):
+    made = {
+      task: synthetic.demonstrations((task,), size, OBS, A)[task]
+      for task, size in zip(TASKS, sizes, strict=False)
+    }
+    generator = np.random.default_rng(0)
+    return SplitPairs(made, tuple(made), lambda x: x, "cpu", share, generator)
+
+  def test_is_70_to_30_disjoint_and_whole(self):
+    pairs = self._pairs((100, 50, 10))
+    offset = 0
+    for size, train, held_out in zip(
+      (100, 50, 10), pairs.train_rows, pairs.validation_rows, strict=True
+    ):
+      self.assertLen(held_out, round(0.3 * size))
+      self.assertEmpty(set(train) & set(held_out))
+      own = set(range(offset, offset + size))
+      self.assertEqual(set(train) | set(held_out), own)
+      offset += size
+
+  def test_follows_from_the_seed(self):
+    first, second = self._pairs((100,)), self._pairs((100,))
+    np.testing.assert_array_equal(first.train_rows[0], second.train_rows[0])
+
+  def test_both_parts_always_have_a_row(self):
+    pairs = self._pairs((2,), share=0.01)
+    self.assertEqual(
+      (len(pairs.train_rows[0]), len(pairs.validation_rows[0])), (1, 1)
+    )
+    with self.assertRaisesRegex(ValueError, "fewer than 2 pairs of stack"):
+      self._pairs((1,))
+
+  def test_an_epoch_has_every_training_row(self):
+    pairs = self._pairs((100, 50))
+    order = pairs.shuffled(np.random.default_rng(1), 16)
+    self.assertEqual(order.shape, (5, 2, 16))  # 70 rows, and 10 once more
+    large, small = order.swapaxes(0, 1).flatten(1).numpy()
+    rows, counts = np.unique(large, return_counts=True)
+    np.testing.assert_array_equal(rows, pairs.train_rows[0])
+    self.assertEqual((counts == 2).sum(), 10)
+    self.assertEqual(len(set(large[:70])), 70)
+    np.testing.assert_array_equal(np.unique(small), pairs.train_rows[1])
+
+  def test_a_batch_holds_each_tasks_own_rows(self):
+    pairs = self._pairs((100, 50))
+    order = pairs.shuffled(np.random.default_rng(1), 16)
+    batch = pairs.batch(order[3])
+    made = synthetic.demonstrations(("reach",), 50, OBS, A)["reach"]
+    rows = order[3, 1].numpy() - 100
+    np.testing.assert_array_equal(batch.inputs[1], made.observation[rows])
+    np.testing.assert_array_equal(batch.action[1], made.action[rows])
+
+
+class LossTest(absltest.TestCase):
+  def test_multitask_loss_by_hand(self):
+    """The mean over tasks of mean over rows of sum over the action."""
+    agent = _build(TASKS[:2])
+    agent.begin_epoch()
+    rows = agent._order[-1]
+    inputs, action = agent._pairs.batch(rows)
+    by_task = []
+    for index in range(2):
+      with torch.no_grad():
+        mean, _ = agent._network(inputs[index])
+      shown = np.tanh(mean[index].numpy())
+      squares = (shown - action[index].numpy()) ** 2
+      by_task.append(sum(squares.sum(1)) / 16)
+    agent.update()
+    metrics = agent.metrics()
+    self.assertAlmostEqual(metrics["loss/train"], np.mean(by_task), places=5)
+    self.assertAlmostEqual(metrics["loss_train/reach"], by_task[1], places=5)
+
+  def test_validation_loss_is_of_the_held_out_rows(self):
+    agent = _build()
+    losses = agent.validation_losses()
+    made = synthetic.demonstrations(TASKS, 100, OBS, A)
+    for index, task in enumerate(TASKS):
+      rows = agent._pairs.validation_rows[index] - 100 * index
+      shown = agent.policy.act(made[task].observation[rows], task)
+      squares = np.square(shown - made[task].action[rows]).sum(1)
+      self.assertAlmostEqual(losses[index], squares.mean(), places=5)
+
+  def test_the_loss_trains_trunk_and_heads(self):
+    agent = _build()
+    before = [p.detach().clone() for p in agent._network.parameters()]
+    _epoch(agent)
+    for old, new in zip(before, agent._network.parameters(), strict=True):
+      self.assertTrue((old != new).any())
+
+
+class EarlyStopTest(absltest.TestCase):
+  def _with_losses(self, losses, tolerance):
+    """Ends epochs with made-up validation losses and telling weights."""
+    agent = _build(("stack",), overfit_tolerance=tolerance)
+    for epoch, loss in enumerate(losses, 1):
+      with torch.no_grad():
+        agent._network.heads.output.bias.fill_(epoch)
+      agent.validation_losses = lambda loss=loss: [loss]
+      agent.end_epoch()
+      if agent.has_converged:
+        return agent, epoch
+    return agent, None
+
+  def test_stops_after_the_tolerance_and_keeps_the_best(self):
+    losses = [5.0, 4.0, 4.5, 3.0, 3.0, 3.1, 3.2, 1.0]
+    agent, epoch = self._with_losses(losses, tolerance=3)
+    self.assertEqual(epoch, 7)  # the third after the fourth
+    bias = agent.policy_arrays()["heads.output.bias"]
+    np.testing.assert_array_equal(bias, np.full_like(bias, 4))
+    self.assertEqual(agent.metrics()["loss/best_validation"], 3.0)
+    self.assertEqual(agent.metrics()["best_epoch"], 4)
+
+  def test_goes_on_while_it_improves(self):
+    agent, epoch = self._with_losses([5, 6, 4, 5, 3, 4, 2], tolerance=2)
+    self.assertIsNone(epoch)
+    self.assertFalse(agent.has_converged)
+
+  def test_learns_and_converges_on_synthetic_data(self):
+    torch.set_num_threads(1)
+    agent = _build(("stack",), overfit_tolerance=5)
+    start = np.mean(agent.validation_losses())
+    for _ in range(500):
+      _epoch(agent)
+      if agent.has_converged:
+        break
+    metrics = agent.metrics()
+    self.assertTrue(agent.has_converged)
+    self.assertEqual(metrics["epoch"] - metrics["best_epoch"], 5)
+    self.assertLess(metrics["loss/best_validation"], 0.1 * start)
+
+
+class ContractTest(parameterized.TestCase):
+  def test_resumes_to_the_same_numbers(self):
+    agent, other = _build(), _build(seed=3)
+    for _ in range(2):
+      _epoch(agent)
+    arrays, tree = nested.pack(agent.state_dict())
+    state = nested.unpack(arrays, json.loads(json.dumps(tree)))
+    other._pairs = agent._pairs  # the split follows from the seed
+    other.load_state_dict(state)
+    for one in (agent, other):
+      for _ in range(2):
+        _epoch(one)
+    self.assertEqual(agent.metrics(), other.metrics())
+    for name, array in agent.policy_arrays().items():
+      np.testing.assert_array_equal(array, other.policy_arrays()[name])
+
+  def test_metrics_keep_their_names(self):
+    agent = _build()
+    first = agent.metrics()
+    _epoch(agent)
+    later = agent.metrics()
+    self.assertEqual(list(first), list(later))
+    self.assertIn("loss_validation/lift", first)
+    self.assertTrue(all(np.isfinite(list(later.values()))))
+
+  @parameterized.parameters((("stack",),), (TASKS,))
+  def test_policy_folder_acts_the_same(self, tasks):
+    agent = _build(tasks)
+    _epoch(agent)
+    folder = self.create_tempdir().full_path
+    agent.policy.save(folder)
+    rows = synthetic.transitions(3, OBS, A).observation
+    np.testing.assert_array_equal(
+      Policy.load(folder).act(rows, tasks[-1]),
+      agent.policy.act(rows, tasks[-1]),
+    )
+
+  @parameterized.parameters(
+    {"standardise": True},
+    {"bfloat16": True},
+    {"weight_decay": 0.01, "max_gradient_norm": 10.0},
+  )
+  def test_options_train(self, **fields):
+    agent = _build(**fields)
+    _epoch(agent)
+    self.assertTrue(np.isfinite(agent.metrics()["loss/validation"]))
+
+  def test_bad_settings_are_listed(self):
+    with self.assertRaisesRegex(
+      ValueError,
+      "overfit_tolerance is 0.*validation_share is 1.0.*layout is 'x",
+    ):
+      BcConfig(overfit_tolerance=0, validation_share=1.0, layout="x")
+
+  def test_other_sizes_are_refused(self):
+    with self.assertRaisesRegex(ValueError, "the environment has \\(3, 4\\)"):
+      build(
+        BcConfig(),
+        TASKS,
+        synthetic.demonstrations(TASKS, 10, OBS, A),
+        None,
+        0,
+        "cpu",
+        3,
+        A,
+      )
+
+
+if __name__ == "__main__":
+  absltest.main()

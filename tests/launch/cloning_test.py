@@ -1,0 +1,131 @@
+"""BC runs from their config to their files, continued, and played."""
+
+import pathlib
+import signal
+from unittest import mock
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+import lfgp_dmc
+from launch import configs, training
+from lfgp_dmc import csv_files, evaluation, run_folder
+from tests.launch import fixtures
+
+_RATES = ("wall_s", "updates_per_s")
+
+
+def _config(dataset, algorithm, **changes):
+  config = configs.make_config(algorithm)
+  small = {
+    "agent.batch_size": 8,
+    "agent.hidden_size": 16,
+    "agent.learning_rate": 3e-3,
+    "agent.overfit_tolerance": 5,
+    "checkpoint_every": 40,
+    "demonstrations": str(dataset),
+    "deterministic": True,
+    "device": "cpu",
+    "env_steps": 2000,
+    "environment": fixtures.POINT,
+    "evaluate_every": 100,
+    "evaluation_episodes": 1,
+    "evaluation_workers": 1,
+    "log_every": 20,
+    "main_task": "right",
+    "pairs_per_task": 40,
+  }
+  config.update_from_flattened_dict({**small, **changes})
+  return configs.to_run_config(config)
+
+
+def _rows(path: pathlib.Path) -> list[dict[str, str]]:
+  _, rows = csv_files.read(path)
+  return [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
+
+
+class CloningTest(parameterized.TestCase):
+  def setUp(self):
+    super().setUp()
+    self.folder = pathlib.Path(self.create_tempdir().full_path)
+    self.dataset = fixtures.write_dataset(self.folder / "data")
+
+  @parameterized.parameters("bc", "bc_less", "multitask_bc")
+  def test_leaves_rows_a_checkpoint_and_a_policy(self, algorithm):
+    run = self.folder / "runs" / algorithm
+    config = _config(self.dataset, algorithm)
+    progress = training.train(config, run, progress_bar=False)
+    self.assertTrue(progress.is_complete)
+    rows = _rows(run / "metrics.csv")
+    last = rows[-1]
+    self.assertEqual(int(last["env_step"]), progress.update)
+    self.assertEqual(float(last["epoch"]) - float(last["best_epoch"]), 5)
+    self.assertLess(float(last["loss/train"]), float(rows[0]["loss/train"]))
+    best = min(float(row["loss/validation"]) for row in rows)
+    self.assertLessEqual(float(last["loss/best_validation"]), best)
+    tasks = ("right", "left") if algorithm == "multitask_bc" else ("right",)
+    evaluated = evaluation.read_csv(run / "evaluation.csv")
+    self.assertEqual({row.task for row in evaluated}, set(tasks))
+    self.assertEqual(evaluated[-1].env_step, progress.update)
+    self.assertFalse((run / "replay").exists())
+    act = lfgp_dmc.load_policy(run, tasks[-1])
+    self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
+    stored = run_folder.read_config(run)["policy"]
+    self.assertEqual(stored["env_step"], progress.update)
+
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
+    config = _config(self.dataset, "multitask_bc")
+    one, other = self.folder / "one", self.folder / "other"
+    whole = training.train(config, one, progress_bar=False)
+    real, calls = training._Run._checkpoint, []
+
+    def stop_after_two(run, progress):
+      real(run, progress)
+      calls.append(progress.env_step)
+      if len(calls) == 2:
+        signal.raise_signal(signal.SIGTERM)
+
+    with mock.patch.object(training._Run, "_checkpoint", stop_after_two):
+      stopped = training.train(config, other, progress_bar=False)
+    self.assertFalse(stopped.is_complete)
+    # What a kill after a later row would leave, too.
+    with open(other / "metrics.csv", "a", encoding="utf-8") as file:
+      file.write("9999,9999")
+    resumed = training.train(config, other, resume=True, progress_bar=False)
+    self.assertEqual(resumed.update, whole.update)
+    for name in ("metrics.csv", "evaluation.csv"):
+      self.assertEqual(_rows(other / name), _rows(one / name))
+    policies = [
+      (run / "policy.safetensors").read_bytes() for run in (one, other)
+    ]
+    self.assertEqual(*policies)
+    again = training.train(config, one, resume=True, progress_bar=False)
+    self.assertEqual(again.update, whole.update)
+
+  def test_less_data_is_the_algorithms_own_default(self):
+    self.assertEqual(configs.make_config("bc_less").pairs_per_task, 9000)
+    self.assertEqual(configs.make_config("bc").pairs_per_task, 0)
+
+
+class DacRunTest(absltest.TestCase):
+  def test_trains_the_main_task_alone(self):
+    folder = pathlib.Path(self.create_tempdir().full_path)
+    dataset = fixtures.write_dataset(folder / "data")
+    config = fixtures.small_config(
+      dataset,
+      **{
+        "algorithm": "dac",
+        "agent.layout": "separate",
+        "agent.scheduler": "main_only",
+        "env_steps": 60,
+      },
+    )
+    training.train(config, folder / "run", progress_bar=False)
+    rows = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    self.assertEqual({row.task for row in rows}, {"right"})
+    act = lfgp_dmc.load_policy(folder / "run")
+    self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
+
+
+if __name__ == "__main__":
+  absltest.main()
