@@ -1,0 +1,116 @@
+"""The value penalty: by hand, its bounds, and what it holds back."""
+
+import math
+
+import numpy as np
+import torch
+from absl.testing import absltest
+
+from agents import synthetic
+from agents.lfgp import LfgpConfig, build
+from agents.losses.critic import critic_loss, value_penalty_loss
+from agents.value_bounds import ValueBounds
+
+_CPU = torch.device("cpu")
+
+
+class LossTest(absltest.TestCase):
+  def test_by_hand(self):
+    q = torch.tensor([[[1.0, 5.0], [-3.0, 0.0]], [[2.0, 2.0], [0.0, 0.0]]])
+    low = torch.tensor([[-1.0], [-1.0]])
+    high = torch.tensor([[2.0], [2.0]])
+    loss, metrics = value_penalty_loss(q, low, high, 10.0)
+    # Beyond the bounds by 3 and by 2, each in a mean over two rows.
+    self.assertAlmostEqual(loss.item(), 10 * (9 / 2 + 4 / 2), places=4)
+    self.assertEqual(metrics["value_low"].tolist(), [-1.0, -1.0])
+    mask = torch.tensor([[1.0, 0.0], [1.0, 1.0]])
+    loss, _ = value_penalty_loss(q, low, high, 10.0, mask)
+    self.assertAlmostEqual(loss.item(), 10 * 4 / 2, places=4)
+
+  def test_masked_rows_count_for_nothing(self):
+    q = torch.tensor([[[1.0, 9.0]], [[2.0, 9.0]]])
+    target = torch.zeros(1, 2)
+    loss, _ = critic_loss(q, target, torch.tensor([[1.0, 0.0]]))
+    self.assertAlmostEqual(loss.item(), 1.0 + 4.0)
+
+
+class BoundsTest(absltest.TestCase):
+  def test_medians_over_a_window(self):
+    bounds = ValueBounds(1, 3, 0.9, _CPU)
+    seen = []
+    for most in (1.0, 2.0, 9.0, 5.0, 7.0):
+      low, high = bounds.of_rewards(torch.tensor([[-2 * most, most]]))
+      seen.append((low.item(), high.item()))
+    expected = [1.0, 1.5, 2.0, 5.0, 7.0]
+    np.testing.assert_allclose(
+      seen, [(-20 * value, 10 * value) for value in expected], rtol=1e-4
+    )
+
+  def test_bounds_stay_on_their_sides_of_zero(self):
+    bounds = ValueBounds(1, 3, 0.9, _CPU)
+    low, high = bounds.of_rewards(torch.tensor([[2.0, 3.0]]))
+    self.assertAlmostEqual(low.item(), -0.1, places=4)
+    self.assertAlmostEqual(high.item(), 30.0, places=4)
+
+  def test_of_examples(self):
+    bounds = ValueBounds(2, 50, 0.99, _CPU)
+    own = torch.tensor([[False, True, True], [False, False, False]])
+    own[1, 0] = True
+    value = torch.tensor([[0.0, 2.0, 4.0], [1.0, 5.0, 5.0]])
+    low, high = bounds.of_examples(value, own, 0.1)
+    np.testing.assert_allclose(low, [[-10.0], [-10.0]], rtol=1e-4)
+    expected = [[3.0, 10.0, 10.0], [10.0, 1.0, 1.0]]
+    np.testing.assert_allclose(high, expected, rtol=1e-4)
+
+  def test_state_goes_on(self):
+    first, second = (ValueBounds(2, 4, 0.9, _CPU) for _ in range(2))
+    generator = torch.Generator().manual_seed(0)
+    rows = torch.randn(12, 2, 5, generator=generator)
+    for row in rows[:6]:
+      first.of_rewards(row)
+    second.load_state_dict(first.state_dict())
+    for row in rows[6:]:
+      torch.testing.assert_close(first.of_rewards(row), second.of_rewards(row))
+
+
+class AgentTest(absltest.TestCase):
+  def test_holds_values_between_the_bounds_and_logs_them(self):
+    """The target's entropy term alone drives values out of the bounds."""
+    means = {}
+    for penalty in (0.0, 10.0):
+      agent = build(
+        LfgpConfig(
+          hidden_size=16,
+          batch_size=32,
+          reward_source="replay",
+          reward_clip=0.02,
+          scheduler="main_only",
+          critic_learning_rate=3e-3,
+          polyak=0.2,
+          value_penalty=penalty,
+        ),
+        ("reach",),
+        {},
+        synthetic.ArrayReplay(
+          synthetic.transitions(200, 6, 2), np.ones((200, 1)), ("reach",)
+        ),
+        0,
+        "cpu",
+        6,
+        2,
+      )
+      for _ in range(200):
+        agent.update()
+      agent.metrics()
+      agent.update()
+      means[penalty] = agent.metrics()
+    self.assertTrue(math.isnan(means[0.0]["value_high/reach"]))
+    high = means[10.0]["value_high/reach"]
+    self.assertAlmostEqual(high, 2.0, places=3)
+    self.assertGreater(means[0.0]["q/reach"], high + 1)
+    self.assertLess(means[10.0]["q/reach"], high + 0.5)
+    self.assertGreater(means[10.0]["loss/value_penalty"], 0.0)
+
+
+if __name__ == "__main__":
+  absltest.main()

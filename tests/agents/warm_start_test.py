@@ -1,0 +1,195 @@
+"""Starts from cloned behaviour, and whether it is kept."""
+
+import numpy as np
+import torch
+from absl.testing import absltest, parameterized
+
+from agents import synthetic
+from agents.lfgp import LfgpConfig, build
+from agents.policy import Policy
+from lfgp_dmc import collection, environments, evaluation, loop, metrics, toy
+from lfgp_dmc.collection_attempts import Plan
+from lfgp_dmc.replay import Replay
+
+TASKS = ("stack", "reach", "lift")
+OBS, A = 6, 2
+
+
+def _build(tasks=TASKS, seed=0, **fields):
+  settings = {
+    "hidden_size": 16,
+    "batch_size": 32,
+    "discriminator_batch_size": 32,
+  }
+  return build(
+    LfgpConfig(**(settings | fields)),
+    tasks,
+    synthetic.demonstrations(tasks, 100, OBS, A),
+    synthetic.ArrayReplay(synthetic.transitions(200, OBS, A)),
+    seed,
+    "cpu",
+    OBS,
+    A,
+  )
+
+
+def _states(module):
+  return {k: v.clone() for k, v in module.state_dict().items()}
+
+
+class FreezeTest(parameterized.TestCase):
+  @parameterized.parameters("shared", "own")
+  def test_the_intentions_trunk_waits(self, actor_trunk):
+    agent = _build(
+      actor_trunk=actor_trunk,
+      freeze_updates=2,
+      weight_decay=0.01,
+      bc_weight=1.0,
+      intention_learning_rate=1e-3,
+    )
+    networks = agent._learner.networks
+    trunk = networks.intentions.trunk
+    start, heads = _states(trunk), _states(networks.critics.heads)
+    for _ in range(2):
+      agent.update()
+    torch.testing.assert_close(_states(trunk), start, rtol=0, atol=0)
+    moved = networks.critics.heads.state_dict()
+    self.assertFalse(torch.equal(moved["bias"], heads["bias"]))
+    agent.update()
+    self.assertFalse(torch.equal(trunk.first.weight, start["first.weight"]))
+
+  def test_a_warm_start_trains_the_common_trunk_before(self):
+    agent = _build(
+      freeze_updates=5, bc_warm_start_updates=20, bc_learning_rate=1e-3
+    )
+    networks = agent._learner.networks
+    self.assertIs(networks.intentions.trunk, networks.critics.trunk)
+    start = _states(networks.critics.trunk)
+    agent.prepare()
+    cloned = _states(networks.critics.trunk)
+    self.assertFalse(torch.equal(cloned["first.weight"], start["first.weight"]))
+    self.assertFalse(networks.intentions.owns_trunk)
+    torch.testing.assert_close(_states(networks.target_critics.trunk), cloned)
+    agent.update()
+    torch.testing.assert_close(_states(networks.critics.trunk), cloned)
+
+
+class InitFromTest(parameterized.TestCase):
+  @parameterized.parameters("shared_trunk", "separate")
+  def test_intentions_of_common_tasks_act_like_the_policy(self, layout):
+    source = _build(("reach", "bring"), 1, standardise=True, layout=layout)
+    policy = source.policy
+    agent = _build(init_from="a folder", standardise=True, layout=layout)
+    rows = synthetic.transitions(5, OBS, A).observation
+    before = agent.policy.act(rows, "stack")
+    agent.start_from(policy)
+    np.testing.assert_array_equal(
+      agent.policy.act(rows, "reach"), policy.act(rows, "reach")
+    )
+    self.assertFalse(np.array_equal(agent.policy.act(rows, "stack"), before))
+    networks = agent._learner.networks
+    self.assertTrue(networks.intentions.owns_trunk)
+    self.assertIsNot(networks.intentions.trunk, networks.critics.trunk)
+    for critics in (networks.critics, networks.target_critics):
+      torch.testing.assert_close(
+        _states(critics.trunk), _states(networks.intentions.trunk)
+      )
+    agent.prepare()
+    agent.update()
+
+  def test_other_sizes_and_tasks_are_refused(self):
+    agent = _build(init_from="a folder")
+    with self.assertRaisesRegex(ValueError, "the policy has none of stack"):
+      agent.start_from(_build(("bring",)).policy)
+    with self.assertRaisesRegex(ValueError, "the policy: .*has shape"):
+      agent.start_from(_build(hidden_size=8).policy)
+
+
+class AbsorbingFlagTest(absltest.TestCase):
+  def test_every_network_sees_one_more_input_that_is_0(self):
+    agent = _build(absorbing_flag=True, standardise=True)
+    networks = agent._learner.networks
+    self.assertEqual(networks.critics.trunk.first.in_features, OBS + 1)
+    discriminator = networks.discriminator
+    self.assertEqual(discriminator.first.in_features, OBS + 1 + A)
+    draw = agent._batches.draw(0)
+    self.assertEqual(draw.batch.inputs.shape, (32, OBS + 1))
+    self.assertTrue((draw.batch.inputs[:, -1] == 0).all())
+    self.assertTrue((draw.expert.inputs[..., -1] == 0).all())
+    agent.update()
+
+  def test_a_stored_policy_remembers_it(self):
+    agent = _build(absorbing_flag=True)
+    options = agent.policy_options()
+    self.assertEqual(options["observation_size"], OBS)
+    stored = Policy.from_arrays(agent.policy_arrays(), options)
+    rows = synthetic.transitions(5, OBS, A).observation
+    np.testing.assert_array_equal(
+      stored.act(rows, "lift"), agent.policy.act(rows, "lift")
+    )
+
+
+class KeptSuccessTest(absltest.TestCase):
+  """A thousand updates after the warm start: success is not lost."""
+
+  def test_success_of_cloning_is_kept(self):
+    torch.set_num_threads(1)
+    plan = Plan(
+      lambda task: toy.PointEnvironment(),
+      toy.WalkingActor,
+      "right",
+      toy.TASKS,
+      seed=1,
+    )
+    shown = collection.collect(plan, "reset", toy.TASKS, 200, progress=False)
+    config = LfgpConfig(
+      hidden_size=32,
+      batch_size=32,
+      discriminator_batch_size=32,
+      episode_steps=20,
+      xi=5,
+      random_steps=0,
+      warm_up=100,
+      intention_learning_rate=3e-4,
+      initial_temperature=0.01,
+      bc_warm_start_updates=200,
+      bc_learning_rate=3e-3,
+      bc_weight=10.0,
+    )
+    environment = toy.PointEnvironment()
+    widths = environments.widths(environment)
+    replay = Replay(1200, *widths)
+    agent = build(
+      config,
+      toy.TASKS,
+      {task: part.demonstrations for task, part in shown.items()},
+      replay,
+      0,
+      "cpu",
+      *widths,
+    )
+    agent.prepare()
+    before = self._success(agent)
+    self.assertEqual(before, {"right": 1.0, "left": 1.0})
+    log = metrics.MetricsLog(self.create_tempdir().full_path)
+    schedule = loop.TrainSchedule(
+      env_steps=1100, warmup_steps=100, progress_bar=False
+    )
+    loop.train(environment, agent, replay, schedule, log)
+    self.assertEqual(agent.updates, 1001)
+    self.assertEqual(self._success(agent), before)
+
+  def _success(self, agent):
+    rows = evaluation.evaluate(
+      toy.PointEnvironment,
+      lambda: agent.policy,
+      toy.TASKS,
+      episodes=10,
+      seed=0,
+      progress=False,
+    )
+    return evaluation.success_rates(rows)
+
+
+if __name__ == "__main__":
+  absltest.main()
