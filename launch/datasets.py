@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from launch.command import UserError
-from launch.configs import RunConfig
+from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import demonstrations
 from lfgp_dmc.demonstrations import Demonstrations
 
@@ -73,8 +73,10 @@ def pairs(found: dict[str, Demonstrations]) -> str:
 
 
 def _command(config: RunConfig, pairs_per_task: str) -> str:
+  is_multitask = ALGORITHMS[config.algorithm].is_multitask
+  own = "" if is_multitask else f"--tasks={config.main_task} "
   return (
-    f"python launch/collect_demonstrations.py --task={config.main_task} "
+    f"python launch/collect_demonstrations.py --task={config.main_task} {own}"
     f"--pairs_per_task={pairs_per_task} --seed={config.seed} "
     f"--output={config.demonstrations}"
   )

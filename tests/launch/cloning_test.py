@@ -107,6 +107,33 @@ class CloningTest(parameterized.TestCase):
     self.assertEqual(configs.make_config("bc").pairs_per_task, 0)
 
 
+class OtherWorldsTest(absltest.TestCase):
+  def test_clones_on_a_task_of_the_control_suite(self):
+    folder = pathlib.Path(self.create_tempdir().full_path)
+    dataset = fixtures.write_dataset(folder / "data", ("swingup",), 5, 1)
+    config = _config(
+      dataset,
+      "bc",
+      environment="tests.launch.fixtures:load_cartpole",
+      main_task="swingup",
+      env_steps=100,
+    )
+    training.train(config, folder / "run", progress_bar=False)
+    (row,) = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    self.assertEqual((row.task, row.success), ("swingup", None))
+    act = lfgp_dmc.load_policy(folder / "run")
+    self.assertEqual(act(np.zeros(5, np.float32)).shape, (1,))
+
+
+class DatasetHintTest(absltest.TestCase):
+  def test_asks_for_the_main_task_alone(self):
+    config = _config(pathlib.Path("no/where"), "bc")
+    with self.assertRaisesRegex(
+      training.UserError, "--task=right --tasks=right --pairs_per_task"
+    ):
+      training.train(config, pathlib.Path("never"), progress_bar=False)
+
+
 class DacRunTest(absltest.TestCase):
   def test_trains_the_main_task_alone(self):
     folder = pathlib.Path(self.create_tempdir().full_path)

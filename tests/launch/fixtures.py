@@ -42,6 +42,15 @@ def write_dataset(
   return folder
 
 
+def load_cartpole(seed: int = 0):
+  """A task of the control suite, half a second long; it tells no success."""
+  from dm_control import suite
+
+  return suite.load(
+    "cartpole", "swingup", task_kwargs={"random": seed, "time_limit": 0.5}
+  )
+
+
 def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   """A run of the toy environment that takes a second or two."""
   config = configs.make_config()
