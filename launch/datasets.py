@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from launch.command import UserError
 from launch.configs import ALGORITHMS, RunConfig
-from lfgp_dmc import demonstrations
+from lfgp_dmc import demonstrations, published_examples
 from lfgp_dmc.demonstrations import Demonstrations
 
 _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
@@ -18,9 +18,14 @@ def load(
 ) -> dict[str, Demonstrations]:
   """Task -> demonstrations, checked against the environment's widths.
 
+  Returns:
+    Those of the dataset's folder, or none if the agent uses none.
+
   Raises:
     UserError: the dataset cannot be used; one line a faulty file.
   """
+  if not config.uses_demonstrations:
+    return {}
   if not config.demonstrations:
     raise UserError(
       "config.demonstrations is not set: give the dataset's folder, see "
@@ -30,7 +35,7 @@ def load(
   if not folder.exists():
     collect_if_asked(config)
   try:
-    found = demonstrations.read_folder(folder, tasks, *widths)
+    found = _read(folder, tasks, widths)
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
     raise UserError(f"{error}{hint}") from None
@@ -49,6 +54,15 @@ def load(
   return {
     task: data.head(config.pairs_per_task) for task, data in found.items()
   }
+
+
+def _read(
+  folder: pathlib.Path, tasks: Sequence[str], widths: tuple[int, int]
+) -> dict[str, Demonstrations]:
+  """Reads our own files, or a folder of published examples of success."""
+  if published_examples.is_folder_of_examples(folder):
+    return published_examples.read_folder(folder, tasks)
+  return demonstrations.read_folder(folder, tasks, *widths)
 
 
 def collect_if_asked(config: RunConfig) -> None:

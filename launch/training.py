@@ -9,7 +9,7 @@ import dm_env
 import safetensors.numpy
 import torch
 
-from launch import actors, command, datasets, worlds
+from launch import actors, command, datasets, starting, worlds
 from launch.command import UserError
 from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import (
@@ -58,11 +58,12 @@ def train(
     )
   device = set_up_torch(config)
   with command.checked_input():
-    environment = worlds.build(config.environment, config.main_task)
+    environment = _build_world(config)
     tasks = tasks_of(config, environment)
     widths = environments.widths(environment)
   shown = datasets.load(config, tasks, widths)
-  print(f"demonstrations: {config.demonstrations}, {datasets.pairs(shown)}")
+  if shown:
+    print(f"demonstrations: {config.demonstrations}, {datasets.pairs(shown)}")
   with command.checked_input():
     open_folder = run_folder.resume if resume else run_folder.create
     folder = open_folder(path, config.to_dict())
@@ -70,6 +71,8 @@ def train(
     run = _Run(config, folder, environment, tasks, shown, device)
     if resume:
       run.restore()
+    else:
+      run.start()
   except (ValueError, OSError) as error:
     if not resume:  # it cannot start: as if it had not been tried
       shutil.rmtree(path)
@@ -142,12 +145,14 @@ def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
     folder: an existing folder.
   """
   device = set_up_torch(config)
-  environment = worlds.build(config.environment, config.main_task)
+  environment = _build_world(config)
   tasks = tasks_of(config, environment)
   widths = environments.widths(environment)
+  stored = _reward_tasks(config, environment, tasks)
   environment.close()
   shown = datasets.load(config, tasks, widths)
-  agent = _build_agent(config, tasks, shown, Replay(1, *widths), device, widths)
+  replay = Replay(1, *widths, reward_tasks=stored)
+  agent = _build_agent(config, tasks, shown, replay, device, widths)
   _write_policy(folder, config, agent, env_step=0)
 
 
@@ -168,18 +173,25 @@ class _Run:
     widths = environments.widths(environment)
     self._replay = None
     if not ALGORITHMS[config.algorithm].is_supervised:
-      self._replay = _open_replay(config, run, widths)
+      stored = _reward_tasks(config, environment, tasks)
+      self._replay = _open_replay(config, run, widths, stored)
     self._agent = _build_agent(
       config, tasks, shown, self._replay, device, widths
     )
     self._log = MetricsLog(run.path)
     self._progress = loop.Progress()
 
+  def start(self) -> None:
+    """Takes over what the config says from other runs and policies."""
+    starting.start(self._config, self._agent, self._replay)
+
   def restore(self) -> None:
-    """Goes back to the last good checkpoint."""
+    """Goes back to the last good checkpoint, or to the start without one."""
     self._progress = resuming.restore(
       self._run, self._agent, self._replay, self._log
     )
+    if not self._progress.env_step:
+      self.start()
 
   def train(self, progress_bar: bool) -> loop.Progress:
     """Runs the loop to its end or to a signal."""
@@ -230,17 +242,36 @@ class _Run:
 
 
 def _open_replay(
-  config: RunConfig, run: RunFolder, widths: tuple[int, int]
+  config: RunConfig,
+  run: RunFolder,
+  widths: tuple[int, int],
+  reward_tasks: tuple[str, ...],
 ) -> Replay:
   # A full ring must still hold the rows of the last checkpoint.
   episode = getattr(config.agent, "episode_steps", 0)
-  is_ring = config.replay_capacity < config.env_steps
+  is_ring = config.replay_capacity < config.env_steps or config.transfer_from
   return Replay(
     config.replay_capacity,
     *widths,
     run.replay,
     slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+    reward_tasks=reward_tasks,
   )
+
+
+def _build_world(config: RunConfig) -> dm_env.Environment:
+  return worlds.build(
+    config.environment, config.main_task, config.keeps_rewards
+  )
+
+
+def _reward_tasks(
+  config: RunConfig, environment: dm_env.Environment, tasks: tuple[str, ...]
+) -> tuple[str, ...]:
+  """Whose dense rewards the replay keeps; all there are, for transfers."""
+  if not config.keeps_rewards:
+    return ()
+  return environments.tasks_with_rewards(environment, tasks)
 
 
 def _build_agent(config, tasks, shown, replay, device, widths):

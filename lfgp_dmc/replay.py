@@ -85,6 +85,11 @@ class Replay:
     return self._capacity
 
   @property
+  def widths(self) -> tuple[int, int]:
+    """The sizes (O, A) of observations and actions."""
+    return self._widths["observation"], self._widths["action"]
+
+  @property
   def total(self) -> int:
     """Rows ever added and not withdrawn: what `rewind` takes."""
     return self._total

@@ -5,6 +5,7 @@ import functools
 import time
 from collections.abc import Callable, Iterator
 
+import numpy as np
 import torch
 from torch.utils import flop_counter
 
@@ -64,7 +65,8 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
   size = observations.OBSERVATION_SIZE
   if replay is None:
     rows = synthetic.transitions(_ROWS, size, _ACTION_SIZE)
-    replay = synthetic.ArrayReplay(rows)
+    rewards = np.zeros((_ROWS, len(tasks)), np.float32)  # for SAC-X
+    replay = synthetic.ArrayReplay(rows, rewards, tasks)
   return ALGORITHMS[config.algorithm].build(
     dataclasses.replace(config.agent, **changes),
     tasks,

@@ -49,6 +49,25 @@ ALGORITHMS: dict[str, Algorithm] = {
     defaults={"scheduler": "main_only", "layout": "separate"},
     is_multitask=False,
   ),
+  "sacx": Algorithm(
+    "SAC-X on the dense rewards of all tasks: the paper's experts",
+    LfgpConfig,
+    lfgp.build,
+    defaults={
+      "reward_source": "replay",
+      "scheduler": "conditional_weighted",
+      "warm_up": 10_000,
+      "random_steps": 0,
+      # Nothing that needs demonstrations, or that fits other rewards.
+      "reward_clip": 0.0,
+      "reward_scale": 1.0,
+      "expert_share": 0.0,
+      "bc_weight": 0.0,
+      "bc_warm_start_updates": 0,
+      "standardise": False,
+      "discriminator_noise": 0.0,
+    },
+  ),
   "bc": Algorithm(
     "behaviour cloning of the main task alone",
     BcConfig,

@@ -27,6 +27,9 @@ class RunConfig:
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: str = ""
 
+  # Another run: its networks, by task name, and its replay are taken over.
+  transfer_from: str = ""
+
   # When things happen.
   log_every: int = 500
   evaluate_every: int = 100_000
@@ -71,6 +74,16 @@ class RunConfig:
       )
     if faults:
       raise ValueError("\n".join(faults))
+
+  @property
+  def uses_demonstrations(self) -> bool:
+    """Whether the agent learns from demonstrations at all."""
+    return getattr(self.agent, "uses_demonstrations", True)
+
+  @property
+  def keeps_rewards(self) -> bool:
+    """Whether the replay keeps dense rewards, and so the world shows them."""
+    return getattr(self.agent, "keeps_rewards", False)
 
   def to_dict(self) -> dict[str, Any]:
     """What `config.json` holds; `configs.from_dict` reads it back."""

@@ -33,6 +33,15 @@ def _build(tasks=TASKS, seed=0, **fields):
   )
 
 
+def _distance(agent, shown):
+  """The mean distance of actions from those that the expert showed."""
+  squares = [
+    np.square(agent.policy.act(data.observation, task) - data.action).sum(1)
+    for task, (data, *_) in shown.items()
+  ]
+  return float(np.sqrt(np.mean(squares)))
+
+
 def _states(module):
   return {k: v.clone() for k, v in module.state_dict().items()}
 
@@ -169,7 +178,7 @@ class KeptSuccessTest(absltest.TestCase):
       *widths,
     )
     agent.prepare()
-    before = self._success(agent)
+    before, apart = self._success(agent), _distance(agent, shown)
     self.assertEqual(before, {"right": 1.0, "left": 1.0})
     log = metrics.MetricsLog(self.create_tempdir().full_path)
     schedule = loop.TrainSchedule(
@@ -178,6 +187,7 @@ class KeptSuccessTest(absltest.TestCase):
     loop.train(environment, agent, replay, schedule, log)
     self.assertEqual(agent.updates, 1001)
     self.assertEqual(self._success(agent), before)
+    self.assertLess(_distance(agent, shown), 1.2 * apart)  # without BC: 8 x
 
   def _success(self, agent):
     rows = evaluation.evaluate(

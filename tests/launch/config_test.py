@@ -93,20 +93,48 @@ class FlagfilesTest(parameterized.TestCase):
   @parameterized.parameters(*_FLAGFILES)
   def test_parses_to_a_valid_config(self, name):
     config = resolve(f"--flagfile={_FLAGS / name}")
-    self.assertNotEmpty(config.demonstrations)
     text = (_FLAGS / name).read_text(encoding="utf-8")
+    if config.transfer_from:
+      self.assertIn(f"--run={config.transfer_from}", text)
+    if not config.uses_demonstrations:
+      self.assertEmpty(config.demonstrations)
+      return
+    self.assertNotEmpty(config.demonstrations)
     self.assertIn("collect_demonstrations.py", text)
     self.assertIn(f"--output={config.demonstrations}", text)
 
   @parameterized.product(
-    algorithm=["lfgp", "lfgp_ns", "dac", "bc", "bc_less", "multitask_bc"],
-    main_task=task_names.MAIN_TASKS,
+    algorithm=list(configs.ALGORITHMS), main_task=task_names.MAIN_TASKS
   )
   def test_is_named_after_algorithm_and_main_task(self, algorithm, main_task):
     path = _FLAGS / f"{algorithm}_{main_task}.flags"
     config = resolve(f"--flagfile={path}")
     self.assertEqual((config.algorithm, config.main_task),
                      (algorithm, main_task))  # fmt: skip
+
+  @parameterized.parameters(
+    ("stack", "move_object"),
+    ("bring", "move_object"),
+    ("unstack_stack", "stack"),
+    ("insert", "bring"),
+  )
+  def test_transfers_come_from_where_the_papers_do(self, main_task, source):
+    path = _FLAGS / f"lfgp_transfer_{main_task}.flags"
+    config = resolve(f"--flagfile={path}")
+    self.assertEqual((config.main_task, config.transfer_from),
+                     (main_task, f"runs/lfgp_{source}"))  # fmt: skip
+    path = _FLAGS / f"sacx_{main_task}.flags"
+    config = resolve(f"--flagfile={path}", "--config.transfer_from=")
+    self.assertEqual(config.agent.scheduler, "conditional_weighted")
+    self.assertEqual(config.transfer_from, "")
+
+  @parameterized.parameters(*configs.PRESETS)
+  def test_no_preset_makes_sacx_need_demonstrations(self, preset):
+    config = resolve("--config.algorithm=sacx", f"--preset={preset}")
+    self.assertFalse(config.uses_demonstrations)
+    self.assertTrue(config.keeps_rewards)
+    self.assertEqual((config.agent.warm_up, config.agent.random_steps),
+                     (10_000, 0))  # fmt: skip
 
 
 if __name__ == "__main__":
