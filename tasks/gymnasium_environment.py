@@ -28,6 +28,7 @@ from lfgp_dmc.observations import (
 graphics.choose_backend()  # before shimmy imports MuJoCo
 
 from shimmy import DmControlCompatibilityV0  # noqa: E402
+from shimmy.utils.dm_env import dm_spec2gym_space  # noqa: E402
 
 _TASK_PREFIXES = (SUCCESS_PREFIX, CONDITION_PREFIX, REWARD_PREFIX)
 _FIXED_RENDERING = {"height": 480, "width": 640, "camera_id": "three_quarter"}
@@ -71,7 +72,7 @@ class BlockEnvironment(DmControlCompatibilityV0):
     )
     self.metadata["render_fps"] = frames_a_second  # shimmy's is 1000 times dt
     self._is_flat = options.get("observations", "features") == "features"
-    self.observation_space = self._space(self.observation_space)
+    self.observation_space = self._space()
 
   def reset(
     self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -98,11 +99,12 @@ class BlockEnvironment(DmControlCompatibilityV0):
       self._env.close()
     self._is_closed = True
 
-  def _space(self, everything) -> gymnasium.Space:
+  def _space(self) -> gymnasium.Space:
     if self._is_flat:
       size = (OBSERVATION_SIZE,)
       return gymnasium.spaces.Box(-np.inf, np.inf, size, np.float32)
-    return gymnasium.spaces.Dict(_without_tasks(everything.spaces))
+    everything = dm_spec2gym_space(self._env.observation_spec())
+    return gymnasium.spaces.Dict(_without_tasks(everything))
 
   def _observed(self, observation) -> Any:
     if self._is_flat:

@@ -11,7 +11,12 @@ from launch import config_flags, configs
 from lfgp_dmc import task_names
 
 _FLAGS = pathlib.Path(config_flags.__file__).parent / "flags"
-_FLAGFILES = sorted(path.name for path in _FLAGS.glob("*.flags"))
+# Of runs: not the sweep, whose flags are launch/sweep.py's.
+_FLAGFILES = sorted(
+  path.name
+  for path in _FLAGS.glob("*.flags")
+  if path.name != "paper_sweep.flags"
+)
 
 
 def resolve(*arguments: str) -> configs.RunConfig:

@@ -1,0 +1,202 @@
+"""The runs of a sweep: which there are, what each is called, what is done.
+
+A run is named after its flagfile and seed: `lfgp_stack_0` is
+`launch/flags/lfgp_stack.flags` with `--config.seed=0`.
+"""
+
+import csv
+import dataclasses
+import pathlib
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from lfgp_dmc import csv_files, evaluation, run_folder
+from lfgp_dmc.task_names import ALL_TASKS
+
+FLAGS = pathlib.Path(__file__).with_name("flags")
+INDEX_NAME = "index.csv"
+COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
+           "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
+
+_OWN_TASK = tuple(f"_{task}" for task in ALL_TASKS)
+
+# States, in the life of a run.
+WAITING, RUNNING, DONE = "waiting", "running", "done"
+FAILED, STOPPED, MISSING = "failed", "stopped", "no flagfile"
+HELD = "held"  # another run that it starts from failed or is not there
+
+
+@dataclasses.dataclass
+class Job:
+  """One run, and how it is getting on."""
+
+  algorithm: str
+  main_task: str
+  seed: int
+  folder: pathlib.Path
+  flagfile: pathlib.Path
+  arguments: tuple[str, ...] = ()  # beside flagfile and seed
+  after: str = ""  # name of the run that must be done before
+  state: str = WAITING
+  attempts: int = 0
+  wall_s: float = 0.0  # over all attempts, also of earlier sweeps
+  message: str = ""
+
+  @property
+  def name(self) -> str:
+    """Such as lfgp_stack_0."""
+    return self.folder.name
+
+  @property
+  def log(self) -> pathlib.Path:
+    """What the run prints, all attempts in one file."""
+    return self.folder.with_name(f"{self.name}.log")
+
+  def train_arguments(self) -> list[str]:
+    """Of `launch/train.py`: from the beginning, or on from a checkpoint."""
+    if (self.folder / run_folder.CONFIG_NAME).exists():
+      return [f"--run={self.folder}", "--resume"]
+    return [
+      f"--flagfile={self.flagfile}",
+      f"--config.seed={self.seed}",
+      *self.arguments,
+      f"--run={self.folder}",
+    ]
+
+
+def make_jobs(
+  algorithms: Sequence[str],
+  main_tasks: Sequence[str],
+  seeds: Iterable[int],
+  runs: pathlib.Path,
+  arguments: Sequence[str] = (),
+  flags: pathlib.Path = FLAGS,
+) -> list[Job]:
+  """Every algorithm on every main task, seed by seed.
+
+  Args:
+    algorithms: first parts of flagfiles' names, such as lfgp or lfgp_play; a
+      name that ends with a task, such as lfgp_move_object, is the whole.
+    main_tasks: last parts.
+    seeds: of each.
+    runs: folder for the runs.
+    arguments: more of `launch/train.py` for every run; `{runs}` and `{seed}`
+      are filled in.
+    flags: folder of the flagfiles.
+
+  Returns:
+    The jobs; those without a flagfile are in state `MISSING`.
+  """
+  jobs = []
+  for seed in seeds:
+    for algorithm in algorithms:
+      is_whole = algorithm.endswith(_OWN_TASK)
+      for main_task in ("",) if is_whole else main_tasks:
+        stem = f"{algorithm}_{main_task}" if main_task else algorithm
+        values = {"runs": runs, "seed": seed}
+        job = Job(
+          algorithm,
+          main_task or "own",
+          seed,
+          runs / f"{stem}_{seed}",
+          flags / f"{stem}.flags",
+          tuple(argument.format(**values) for argument in arguments),
+        )
+        if not job.flagfile.is_file():
+          job.state = MISSING
+        jobs.append(job)
+  return jobs
+
+
+def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
+  """Says which runs start from which, by `TARGET:SOURCE:FIELD`.
+
+  Such as `lfgp_transfer_stack:lfgp_move_object:config.transfer_from`: that
+  run of a seed waits for the source's of the same seed, and gets its folder as
+  that field.
+
+  Raises:
+    ValueError: not of that form.
+  """
+  known = {job.name: job for job in jobs}
+  for start in starts:
+    parts = start.split(":")
+    if len(parts) != 3 or not all(parts):
+      raise ValueError(f"{start!r}; valid: TARGET:SOURCE:config.FIELD")
+    target, source, field = parts
+    for job in jobs:
+      if job.name != f"{target}_{job.seed}":
+        continue
+      job.after = f"{source}_{job.seed}"
+      folder = job.folder.with_name(job.after)
+      job.arguments = (*job.arguments, f"--{field}={folder}")
+      if (
+        job.after not in known and not _is_done(folder) and job.state == WAITING
+      ):
+        job.state, job.message = HELD, f"{job.after} is not part of the sweep"
+
+
+def recall(jobs: Sequence[Job], index: pathlib.Path) -> None:
+  """Takes over what an earlier sweep knew, and finds what is done."""
+  earlier = {}
+  if index.is_file():
+    earlier = {row["name"]: row for row in csv_files.read(index)[1]}
+  for job in jobs:
+    row = earlier.get(job.name)
+    if row is not None and row.get("wall_s"):
+      job.wall_s = float(row["wall_s"])
+    was_done = row is not None and row["state"] == DONE
+    is_there = (job.folder / run_folder.CONFIG_NAME).is_file()
+    if is_there and (was_done or _is_done(job.folder)):
+      job.state = DONE
+
+
+def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
+  """Writes a row a run, whole or not at all."""
+  rows = []
+  for job in jobs:
+    step, success = _last_success(job.folder)
+    rows.append(
+      {
+        "name": job.name,
+        "algorithm": job.algorithm,
+        "main_task": job.main_task,
+        "seed": job.seed,
+        "state": job.state,
+        "attempts": job.attempts,
+        "wall_s": f"{job.wall_s:.0f}",
+        "env_step": step,
+        "success": success,
+        "folder": job.folder,
+        "message": job.message,
+      }
+    )
+  csv_files.write(index, COLUMNS, rows)
+
+
+def _is_done(folder: pathlib.Path) -> bool:
+  """Whether a run was evaluated at its last step; says nothing of BC."""
+  try:
+    config = run_folder.read_config(folder)
+    step = _last_success(folder)[0]
+  except ValueError:
+    return False
+  return step != "" and int(step) >= int(config.get("env_steps", 1 << 62))
+
+
+def _last_success(folder: pathlib.Path) -> tuple[str, str]:
+  """The last evaluation of the main task: its step, and share of successes."""
+  try:
+    main_task = run_folder.read_config(folder).get("main_task")
+    rows = evaluation.read_csv(folder / "evaluation.csv")
+  except (OSError, ValueError, csv.Error):
+    return "", ""
+  rows = [row for row in rows if row.task == main_task]
+  if not rows:
+    return "", ""
+  last = max(row.env_step for row in rows)
+  known = [
+    r.success for r in rows if r.env_step == last and r.success is not None
+  ]
+  return str(last), f"{np.mean(known):.3f}" if known else ""
