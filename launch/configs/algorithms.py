@@ -30,6 +30,8 @@ class Algorithm:
     return self.agent_config(**self.defaults)
 
 
+_CLONING = {"checkpoint_every": 5_000}  # updates; its checkpoints are small
+
 ALGORITHMS: dict[str, Algorithm] = {
   "lfgp": Algorithm(
     "Learning from Guided Play with a learned scheduler",
@@ -75,6 +77,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     defaults={"layout": "separate"},
     is_multitask=False,
     is_supervised=True,
+    run_defaults=_CLONING,
   ),
   "bc_less": Algorithm(
     "the same with less data: a multitask method's pairs of the main task",
@@ -83,7 +86,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     defaults={"layout": "separate"},
     is_multitask=False,
     is_supervised=True,
-    run_defaults={"pairs_per_task": 9000},
+    run_defaults={**_CLONING, "pairs_per_task": 9000},
   ),
   "multitask_bc": Algorithm(
     "behaviour cloning of all tasks, with a shared trunk",
@@ -91,5 +94,6 @@ ALGORITHMS: dict[str, Algorithm] = {
     bc.build,
     defaults={"layout": "shared_trunk"},
     is_supervised=True,
+    run_defaults=_CLONING,
   ),
 }
