@@ -8,6 +8,7 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
+from agents.bc import BcAgent
 from launch import configs, training
 from lfgp_dmc import csv_files, evaluation, run_folder
 from tests.launch import fixtures
@@ -101,6 +102,29 @@ class CloningTest(parameterized.TestCase):
     self.assertEqual(*policies)
     again = training.train(config, one, resume=True, progress_bar=False)
     self.assertEqual(again.update, whole.update)
+
+  def test_loses_at_most_what_came_after_its_last_checkpoint(self):
+    changes = {"agent.overfit_tolerance": 20, "log_every": 7}
+    config = _config(self.dataset, "bc", checkpoint_every=30, **changes)
+    one, other = self.folder / "one", self.folder / "other"
+    whole = training.train(config, one, progress_bar=False)
+    real, updates = BcAgent.update, []
+
+    def die_in_an_epoch(agent):
+      updates.append(1)
+      if len(updates) == 59:  # as if killed: no handler runs, nothing is saved
+        raise KeyboardInterrupt
+      real(agent)
+
+    with (
+      mock.patch.object(BcAgent, "update", die_in_an_epoch),
+      self.assertRaises(KeyboardInterrupt),
+    ):
+      training.train(config, other, progress_bar=False)
+    resumed = training.train(config, other, resume=True, progress_bar=False)
+    self.assertEqual(resumed.update, whole.update)
+    for name in ("metrics.csv", "evaluation.csv"):
+      self.assertEqual(_rows(other / name), _rows(one / name))
 
   def test_less_data_is_the_algorithms_own_default(self):
     self.assertEqual(configs.make_config("bc_less").pairs_per_task, 9000)
