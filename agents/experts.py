@@ -124,6 +124,11 @@ class ExpertPool:
     self._finals = np.flatnonzero(last)
     self._final_sizes = np.array([int(part.is_last.sum()) for part in parts])
     self._final_offsets = _offsets(self._final_sizes)
+    # A task that has nothing but rows of success draws from them throughout.
+    rest = [~p.is_last if not p.is_last.all() else p.is_last for p in parts]
+    self._rest = np.flatnonzero(np.concatenate(rest))
+    self._rest_sizes = np.array([int(part.sum()) for part in rest])
+    self._rest_offsets = _offsets(self._rest_sizes)
     self.refresh()
 
   def refresh(self) -> None:
@@ -155,20 +160,25 @@ class ExpertPool:
     Args:
       generator: source of the indices.
       rows: N, pairs a task.
-      final_rows: how many of these come from rows of success.
+      final_rows: how many of these come from rows of success; the others
+        then come from the rest of the task's rows, if it has any.
 
     Returns:
       [K, N, ...] tensors; rows of success come last.
     """
     tasks = len(self._sizes)
-    index = self._offsets[:, None] + generator.integers(
-      self._sizes[:, None], size=(tasks, rows - final_rows)
-    )
-    if final_rows:
+    if not final_rows:
+      index = self._offsets[:, None] + generator.integers(
+        self._sizes[:, None], size=(tasks, rows)
+      )
+    else:
+      rest = self._rest_offsets[:, None] + generator.integers(
+        self._rest_sizes[:, None], size=(tasks, rows - final_rows)
+      )
       chosen = self._final_offsets[:, None] + generator.integers(
         self._final_sizes[:, None], size=(tasks, final_rows)
       )
-      index = np.concatenate([index, self._finals[chosen]], axis=1)
+      index = np.concatenate([self._rest[rest], self._finals[chosen]], axis=1)
     at = torch.from_numpy(index).to(self._device)
     return ExpertBatch(self._inputs[at], self._action[at])
 

@@ -48,6 +48,7 @@ def build(
     for name, observable in built.task.observables.items():
       if name.startswith(_REWARD):
         observable.enabled = True
+    built.reset()  # from here on, its specification tells of them too
   return built
 
 

@@ -223,6 +223,8 @@ class ExpertPoolTest(absltest.TestCase):
       finals = {row.tobytes() for row in part.observation[part.is_last]}
       for row in batch.inputs[index, 6:].numpy():
         self.assertIn(row.tobytes(), finals)
+      for row in batch.inputs[index, :6].numpy():
+        self.assertNotIn(row.tobytes(), finals)
 
   def test_transitions_are_split_with_the_rest_to_the_main_task(self):
     demonstrations = synthetic.demonstrations(TASKS, 60, OBS, A)

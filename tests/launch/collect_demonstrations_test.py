@@ -7,10 +7,14 @@ import subprocess
 import sys
 import time
 
+import torch
 from absl.testing import absltest
 
+from agents.networks.intentions import IntentionHeads, IntentionNetwork
+from agents.networks.trunk import Standardiser, Trunk
+from agents.policy import Policy
 from launch import command
-from lfgp_dmc import demonstrations
+from lfgp_dmc import demonstrations, task_names
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 _SCRIPT = str(_ROOT / "launch" / "collect_demonstrations.py")
@@ -21,6 +25,7 @@ _BAD = (
   ("--output=new --tasks=insert", "--tasks=insert is unknown; valid: stack, "),
   ("--output=new --collection=film", "valid: reset, play"),
   ("--output=new --pairs_per_task=0", "--pairs_per_task=0; valid: 1 or more"),
+  ("--output=new --final_pairs=-1", "--final_pairs=-1; valid: 0 or more"),
   ("--output=new --seed=-1", "--seed=-1; valid: 0 or more"),
   ("--output=new --workers=-1", "--workers=-1; valid: 0 or more"),
   ("--output=new --expert=no/run", "no run folder no/run"),
@@ -80,6 +85,51 @@ class CollectDemonstrationsTest(absltest.TestCase):
         self.assertNotIn("Traceback", errors)
     self.assertEqual(os.listdir(self.folder), ["old"])
     self.assertEmpty(os.listdir(old))
+
+  def test_final_pairs_come_on_top(self):
+    line = "--task=reach --pairs_per_task=5 --final_pairs=2 --output=data"
+    done = _start(line, self.folder)
+    _, errors = done.communicate()
+    self.assertEqual(done.returncode, 0, errors)
+    path = pathlib.Path(self.folder) / "data" / "reach.hdf5"
+    found = demonstrations.read(path, "reach", 59, 4)
+    self.assertLen(found, 7)
+    self.assertTrue(found.is_last[5:].all())
+
+  def test_a_run_demonstrates_with_sampled_actions(self):
+    """A made-up policy that opens, and moves a little at random."""
+    generator = torch.Generator().manual_seed(0)
+    tasks = task_names.task_set("move_object")
+    heads = IntentionHeads(len(tasks), 8, 8, 4, generator)
+    with torch.no_grad():
+      heads.output.weight.zero_()
+      heads.output.bias[:] = torch.tensor([0, 0, 0, -3, -2, -2, -2, -2.0])
+    network = IntentionNetwork(
+      Standardiser(59), Trunk(59, 8, generator), heads, True
+    )
+    run = pathlib.Path(self.folder) / "run"
+    Policy(network, tasks).save(run, {"main_task": "move_object"})
+    line = "--task=open_gripper --pairs_per_task=12 --output=data --expert=run"
+    line += " --workers=1"
+    opens, stacks = (
+      _start(line, self.folder),
+      _start("--task=stack --output=new --expert=run", self.folder),
+    )
+    output, errors = opens.communicate()
+    self.assertEqual(opens.returncode, 0, errors)
+    self.assertIn("open_gripper", output)
+    path = pathlib.Path(self.folder) / "data" / "open_gripper.hdf5"
+    found = demonstrations.read(path, "open_gripper", 59, 4)
+    self.assertEqual(found.attributes["expert"], "run")
+    self.assertTrue((found.action[:, 3] < 0).all())
+    self.assertGreater(found.action[:, :3].std(), 0.05)
+    _, errors = stacks.communicate()
+    self.assertEqual(stacks.returncode, 1)
+    self.assertIn(
+      "error: --expert=run cannot do stack of --task=stack; it can do: "
+      "move_object, open_gripper",
+      errors,
+    )
 
   def test_an_interrupt_leaves_nothing(self):
     line = "--task=stack --pairs_per_task=90000 --workers=2 --output=new"

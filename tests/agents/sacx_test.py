@@ -1,0 +1,62 @@
+"""SAC-X on the toy world: it earns more than at its start."""
+
+import numpy as np
+import torch
+from absl.testing import absltest
+
+from agents.lfgp import LfgpConfig, build
+from lfgp_dmc import environments, evaluation, loop, metrics, toy
+from lfgp_dmc.replay import Replay
+
+
+class SacxTest(absltest.TestCase):
+  def test_return_rises(self):
+    torch.set_num_threads(1)
+    environment = toy.PointEnvironment()
+    widths = environments.widths(environment)
+    replay = Replay(2000, *widths, reward_tasks=toy.TASKS)
+    config = LfgpConfig(
+      reward_source="replay",
+      scheduler="q_table",
+      hidden_size=32,
+      batch_size=32,
+      episode_steps=20,
+      xi=10,
+      random_steps=0,
+      warm_up=100,
+      discount=0.9,
+      critic_learning_rate=3e-3,
+      intention_learning_rate=3e-3,
+      initial_temperature=0.05,
+      polyak=0.05,
+    )
+    agent = build(config, toy.TASKS, {}, replay, 1, "cpu", *widths)
+    before = self._returns(agent)
+    schedule = loop.TrainSchedule(
+      env_steps=500, warmup_steps=100, progress_bar=False
+    )
+    log = metrics.MetricsLog(self.create_tempdir().full_path)
+    loop.train(environment, agent, replay, schedule, log)
+    after = self._returns(agent)
+    for task in toy.TASKS:
+      # Still: about 4; at the goal at once and staying there: about 18.
+      self.assertGreater(after[task], 12.0)
+      self.assertGreater(after[task], before[task] + 3.0)
+
+  def _returns(self, agent):
+    rows = evaluation.evaluate(
+      toy.PointEnvironment,
+      lambda: agent.policy,
+      toy.TASKS,
+      episodes=5,
+      seed=0,
+      progress=False,
+    )
+    return {
+      task: np.mean([row.episode_return for row in rows if row.task == task])
+      for task in toy.TASKS
+    }
+
+
+if __name__ == "__main__":
+  absltest.main()

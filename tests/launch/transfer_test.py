@@ -1,0 +1,280 @@
+"""Runs that go on from other runs: SAC-X, transfers, stored policies."""
+
+import dataclasses
+import pathlib
+import shutil
+import signal
+from unittest import mock
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+from agents.policy import Policy
+from launch import configs, datasets, training
+from launch.command import UserError
+from lfgp_dmc import (
+  checkpoints,
+  csv_files,
+  environments,
+  run_folder,
+  task_names,
+  toy,
+)
+from lfgp_dmc.replay import Replay
+from lfgp_dmc.stored_replay import StoredReplay
+from tests.launch import fixtures
+
+_RATES = ("wall_s", "steps_per_s", "updates_per_s")
+
+
+class TwoWorlds(toy.PointEnvironment):
+  """The toy world, told as one whose tasks are "right" and "up"."""
+
+  def observation_spec(self):
+    return _renamed(super().observation_spec())
+
+  def _observe(self):
+    return _renamed(super()._observe())
+
+
+def _renamed(named):
+  return {name.replace("/left", "/up"): part for name, part in named.items()}
+
+
+OTHER = "tests.launch.transfer_test:TwoWorlds"
+
+
+def _rows(path: pathlib.Path) -> list[dict[str, str]]:
+  _, rows = csv_files.read(path)
+  return [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
+
+
+class _RunTest(parameterized.TestCase):
+  def setUp(self):
+    super().setUp()
+    self.folder = pathlib.Path(self.create_tempdir().full_path)
+    self.dataset = fixtures.write_dataset(self.folder / "data")
+    fixtures.write_dataset(self.folder / "other", ("right", "up"))
+
+  def _config(self, algorithm="lfgp", **changes):
+    if algorithm == "sacx":
+      dense = configs.make_config("sacx").agent.to_dict()
+      small = dataclasses.asdict(fixtures.small_config(self.dataset).agent)
+      for name in ("batch_size", "episode_steps", "hidden_size", "xi"):
+        dense[name] = small[name]
+      dense |= {"warm_up": 20, "scheduler": "uniform"}
+      own = {f"agent.{name}": value for name, value in dense.items()}
+      changes = {**own, "algorithm": "sacx", "demonstrations": "", **changes}
+    return fixtures.small_config(
+      self.dataset, **{"evaluate_every": 1000, "env_steps": 100, **changes}
+    )
+
+  def _train(self, config, name, resume=False):
+    path = self.folder / name
+    return path, training.train(config, path, resume, False)
+
+
+class SacxTest(_RunTest):
+  def test_needs_no_demonstrations_and_keeps_all_rewards(self):
+    path, _ = self._train(self._config("sacx"), "a")
+    stored = StoredReplay(path / "replay")
+    self.assertEqual(stored.reward_tasks, ("right", "left"))
+    for transition, rewards in stored.chunks():
+      position = transition.next_observation[:, 0]
+      expected = np.stack(
+        [1 - np.abs(position - 0.8), 1 - np.abs(position + 0.8)], axis=1
+      )
+      np.testing.assert_allclose(rewards, expected, atol=1e-5)
+    (*_, last) = _rows(path / "metrics.csv")
+    self.assertEqual(last["loss/discriminator"], "nan")
+    self.assertNotEqual(last["reward/left"], "nan")
+
+  def test_killed_and_resumed_it_keeps_the_rewards_and_the_numbers(self):
+    config = self._config("sacx", replay_capacity=60)
+    whole, _ = self._train(config, "whole")
+    real = training._Run._checkpoint
+
+    def stop_at_the_first(run, progress):
+      real(run, progress)
+      signal.raise_signal(signal.SIGTERM)
+
+    with mock.patch.object(training._Run, "_checkpoint", stop_at_the_first):
+      path, progress = self._train(config, "killed")
+    self.assertLess(progress.env_step, 100)
+    # As if killed later: rows beyond the checkpoint, which are to be forgotten.
+    replay = Replay(
+      60, 2, 2, path / "replay", slack=80, reward_tasks=("right", "left")
+    )
+    for transition, rewards in StoredReplay(path / "replay").chunks(newest=5):
+      replay.add_batch(transition, 100 + rewards)
+    replay.flush()
+    del replay
+    self._train(config, "killed", resume=True)
+    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
+    first, second = (
+      list(StoredReplay(run / "replay").chunks()) for run in (path, whole)
+    )
+    np.testing.assert_array_equal(first[0][1], second[0][1])
+
+  def test_a_task_without_a_conditional_table_is_told(self):
+    with self.assertRaisesRegex(UserError, "no conditional table for.*'right'"):
+      config = {"agent.scheduler": "conditional_weighted"}
+      self._train(self._config("sacx", **config), "a")
+
+  def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
+    config = configs.to_run_config(configs.make_config("sacx"))
+    environment = training._build_world(config)
+    shown = environments.tasks_with_rewards(environment, ("stack", "reach"))
+    self.assertEqual(shown[:2], ("stack", "reach"))
+    self.assertCountEqual(shown, task_names.ALL_TASKS)
+
+
+class TransferTest(_RunTest):
+  def _to(self, source, algorithm="lfgp", **changes):
+    return self._config(
+      algorithm,
+      **{
+        "environment": OTHER,
+        "main_task": "up",
+        "demonstrations": ""
+        if algorithm == "sacx"
+        else str(self.folder / "other"),
+        "transfer_from": str(source),
+        "agent.transfer_updates": 7,
+        **changes,
+      },
+    )
+
+  def test_starts_with_the_other_runs_networks_and_replay(self):
+    source, _ = self._train(self._config(), "source")
+    policy = Policy.load(source)
+    started = {}
+    real = training._Run.train
+
+    def look(run, progress_bar):
+      started["policy"] = run._agent.policy.arrays()
+      started["rows"] = len(run._replay)
+      return real(run, progress_bar)
+
+    with mock.patch.object(training._Run, "train", look):
+      path, _ = self._train(self._to(source), "new")
+    self.assertEqual(started["rows"], 100)
+    for name, array in started["policy"].items():
+      old = policy.arrays()[name]
+      if name.startswith("heads."):  # "right" moved from place 0 to 1
+        array, old = array[1], old[0]
+      np.testing.assert_array_equal(array, old)
+    state = checkpoints.load(checkpoints.latest(path / "checkpoints"))
+    # 7 before the first step, and one a step: there is no warm-up.
+    self.assertEqual(state["agent"]["learner"]["updates"], 107)
+    self.assertEqual(state["replay_total"], 200)
+
+  def test_rewards_of_a_new_task_come_from_the_old_replay(self):
+    """SAC-X stored the reward of "left", which becomes a task only later."""
+    config = self._config("sacx", **{"env_steps": 60})
+    with mock.patch.object(training, "tasks_of", lambda *_: ("right",)):
+      source, _ = self._train(config, "source")
+    self.assertEqual(run_folder.read_config(source)["policy"]["tasks"],
+                     ["right"])  # fmt: skip
+    target = self._to(
+      source, "sacx", environment=fixtures.POINT, main_task="left"
+    )
+    path, _ = self._train(target, "new")
+    stored = StoredReplay(path / "replay")
+    self.assertEqual(stored.reward_tasks, ("left", "right"))
+    (transition, rewards), *_ = stored.chunks()
+    self.assertLen(rewards, 160)
+    position = transition.next_observation[:, 0]
+    np.testing.assert_allclose(rewards[:, 0], 1 - abs(position + 0.8),
+                               atol=1e-5)  # fmt: skip
+
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
+    source, _ = self._train(self._config(), "source")
+    config = self._to(source)
+    whole, _ = self._train(config, "whole")
+    real = training._Run._checkpoint
+
+    def stop_at_the_first(run, progress):
+      real(run, progress)
+      signal.raise_signal(signal.SIGTERM)
+
+    with mock.patch.object(training._Run, "_checkpoint", stop_at_the_first):
+      path, _ = self._train(config, "killed")
+    source.rename(self.folder / "moved")  # it is not needed any more
+    self._train(config, "killed", resume=True)
+    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
+
+  def test_killed_before_its_first_checkpoint_it_transfers_again(self):
+    source, _ = self._train(self._config(), "source")
+    config = self._to(source)
+    whole, _ = self._train(config, "whole")
+    path, _ = self._train(config, "killed")
+    shutil.rmtree(path / "checkpoints")
+    self._train(config, "killed", resume=True)
+    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
+
+  def test_what_cannot_be_transferred_from_leaves_no_folder(self):
+    lfgp, _ = self._train(self._config(), "lfgp")
+    small, _ = self._train(self._config(**{"agent.hidden_size": 8}), "small")
+    bare = self.folder / "bare"
+    Policy.load(lfgp).save(bare)
+    for config, message in (
+      (self._to("no/where"), "transfer_from: no run folder no/where"),
+      (self._to(bare), "bare has no good checkpoint"),
+      (self._to(small), "intentions: .*has shape"),
+      (self._to(lfgp, "sacx"), "keeps no rewards of up, right"),
+    ):
+      with self.assertRaisesRegex(UserError, message):
+        self._train(config, "new")
+      self.assertFalse((self.folder / "new").exists())
+
+
+class InitFromTest(_RunTest):
+  def test_starts_from_a_policy_folder(self):
+    source, _ = self._train(self._config(), "source")
+    bare = self.folder / "bare"
+    Policy.load(source).save(bare)
+    config = self._config(
+      **{"agent.init_from": str(bare), "agent.bc_weight": 1.0}
+    )
+    with mock.patch.object(training._Run, "train") as train:
+      train.return_value = None
+      self._train(config, "a")
+    self._train(config, "a", resume=True)  # was killed at once: starts again
+    wrong = self._config(**{"agent.init_from": str(self.folder / "data")})
+    with self.assertRaisesRegex(UserError, "no policy in .*data"):
+      self._train(wrong, "b")
+
+
+class ExamplesTest(_RunTest):
+  def test_learns_from_rows_of_success(self):
+    config = self._config(
+      **{
+        "agent.reward_source": "examples",
+        "agent.scheduler": "weighted_random",
+        "agent.value_penalty": 10.0,
+        "agent.reward_scale": 0.1,
+      }
+    )
+    path, _ = self._train(config, "a")
+    (*_, last) = _rows(path / "metrics.csv")
+    self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
+    self._train(config, "a", resume=True)
+
+  def test_published_examples_are_read_like_a_dataset(self):
+    data = pathlib.Path(__file__).parents[1] / "data"
+    folder = self.folder / "examples"
+    folder.mkdir()
+    with np.load(data / "published_lift.npz", allow_pickle=False) as part:
+      rows = {name: part[name][:50] for name in part.files}
+    rows["observation"] = rows["next_observation"]
+    np.savez(folder / "lift.npz", **rows)
+    config = self._config(**{"demonstrations": str(folder)})
+    shown = datasets.load(config, ["lift"], (59, 4))
+    self.assertLen(shown["lift"], 50)
+    with self.assertRaisesRegex(UserError, "stack.npz: missing"):
+      datasets.load(config, ["lift", "stack"], (59, 4))
+
+
+if __name__ == "__main__":
+  absltest.main()
