@@ -19,8 +19,10 @@ class Look:
   height: int = 480
   width: int = 640
   camera: str = "three_quarter"
-  every: int = 1  # control steps a frame
+  every: int = 1  # control steps a frame; 0: no frames
   overlay: bool = True
+  shadows: bool = True  # and smooth edges; three quarters of a frame's time
+  scheduled_for: str = ""  # the main task, if its scheduler chooses
 
 
 @dataclasses.dataclass
@@ -58,6 +60,7 @@ def record(
   Returns:
     The clip.
   """
+  prepare(environment, look)
   flatten = environments.flattener(environment)
   clip, timestep, task, tail = Clip([], [], {}, 0), first, "", 0
   while True:
@@ -65,7 +68,7 @@ def record(
     if wanted != task:
       task = wanted
       actor.begin(task, seed + clip.steps)
-    if clip.steps % look.every == 0 or timestep.last():
+    if look.every and (clip.steps % look.every == 0 or timestep.last()):
       clip.frames.append(_frame(environment, timestep, task, clip, look))
       clip.labels.append(task)
     if timestep.last() or clip.steps == max_steps:
@@ -83,6 +86,21 @@ def record(
 _TAIL = 20  # control steps shown after a success
 
 
+def prepare(environment: dm_env.Environment, look: Look) -> None:
+  """Sets what must be set before an environment's first picture."""
+  physics = getattr(environment, "physics", None)
+  if physics is not None and not look.shadows:
+    physics.model.light_castshadow[:] = 0
+    physics.model.vis.quality.offsamples = 0
+
+
+def picture(environment: dm_env.Environment, look: Look) -> np.ndarray:
+  """The environment as it is, uint8 [height, width, 3]."""
+  return environment.physics.render(  # type: ignore[attr-defined]
+    look.height, look.width, camera_id=look.camera
+  )
+
+
 def _successes(timestep: dm_env.TimeStep) -> list[str]:
   prefix = "success/"
   return [
@@ -93,14 +111,19 @@ def _successes(timestep: dm_env.TimeStep) -> list[str]:
 
 
 def _frame(environment, timestep, task: str, clip: Clip, look: Look):
-  physics = environment.physics
-  frame = physics.render(look.height, look.width, camera_id=look.camera)
+  frame = picture(environment, look)
   if not look.overlay:
     return frame
-  has_succeeded = bool(environments.has_succeeded(timestep, task))
+  goal = look.scheduled_for or task
+  has_succeeded = bool(environments.has_succeeded(timestep, goal))
+  left, success = _words(task), "success   " if has_succeeded else ""
+  if look.scheduled_for:
+    left = f"scheduler: {left}"
+    success = f"{_words(goal)} {success}" if has_succeeded else ""
   return video.label(
-    frame,
-    task.replace("_", " "),
-    f"{'success   ' if has_succeeded else ''}step {clip.steps}",
-    highlight=has_succeeded,
+    frame, left, f"{success}step {clip.steps}", highlight=has_succeeded
   )
+
+
+def _words(task: str) -> str:
+  return task.replace("_", " ")

@@ -1,24 +1,40 @@
-"""Renders an episode of a run, a stored policy or the scripted expert.
+"""Renders a run, a stored policy or the scripted expert; or just the world.
 
   python launch/render_policy.py --expert=scripted --task=stack
   python launch/render_policy.py --run=runs/stack_1 --task=scheduled \
       --output=videos/scheduled.mp4
+  python launch/render_policy.py --run=runs/stack_1 --grid=2x3
+  python launch/render_policy.py --what=strips --expert=scripted \
+      --output=videos/example_runs.png
+  python launch/render_policy.py --what=reset --task=insert
 
-The suffix of --output chooses a clip (.mp4, .gif) or a film strip (.png); what
-it shows goes into a JSON file beside it.
+--what=episode plays one, or --grid=2x3 six of them with consecutive seeds side
+by side. --what=strips finds a successful episode of each main task (of the
+expert, or of each run of --run=a,b,c,d) and shows it as a row of frames.
+--what=reset shows the world after a reset. The suffix of --output chooses a
+clip (.mp4, .gif) or a picture (.png; of an episode a film strip); what it shows
+goes into a JSON file beside it.
 """
 
 import pathlib
+import re
+from typing import Any
 
+import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, clips, command, playing, worlds
+from launch import actors, clips, command, playing, strips, worlds
 from launch.command import UserError
 from lfgp_dmc import graphics, seeding, video
 
-_RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
+_RUN = flags.DEFINE_string(
+  "run", "", "A run's folder, or a policy folder; several for strips."
+)
 _EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_WHAT = flags.DEFINE_enum(
+  "what", "episode", ["episode", "strips", "reset"], "What is shown."
+)
 _TASK = flags.DEFINE_string(
   "task", "", "The intention, or scheduled; default: the main task."
 )
@@ -31,10 +47,20 @@ _COLLECTION = flags.DEFINE_enum(
 _OUTPUT = flags.DEFINE_string(
   "output", "", ".mp4, .gif or .png; default: videos/NAME_TASK.mp4."
 )
-_SEED = flags.DEFINE_integer("seed", 0, "Of the reset and the actor.")
+_GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
+_SEED = flags.DEFINE_integer(
+  "seed", 0, "Of the (first) reset and the actor.", lower_bound=0
+)
 _CAMERA = flags.DEFINE_string("camera", "three_quarter", "The camera's name.")
-_HEIGHT = flags.DEFINE_integer("height", 480, "Pixels.", lower_bound=32)
-_WIDTH = flags.DEFINE_integer("width", 640, "Pixels.", lower_bound=32)
+_HEIGHT = flags.DEFINE_integer(
+  "height", 480, "Pixels, of the whole grid.", lower_bound=32
+)
+_WIDTH = flags.DEFINE_integer(
+  "width", 640, "Pixels, of the whole grid.", lower_bound=32
+)
+_SHADOWS = flags.DEFINE_bool(
+  "shadows", True, "Shadows and smooth edges; without, 3 times as fast."
+)
 _EVERY = flags.DEFINE_integer(
   "every", 1, "Control steps a frame.", lower_bound=1
 )
@@ -45,87 +71,173 @@ _OVERLAY = flags.DEFINE_bool("overlay", True, "Draw intention and success.")
 _STRIP = flags.DEFINE_integer(
   "strip_frames", 6, "Frames of a film strip (.png).", lower_bound=1
 )
+_ATTEMPTS = flags.DEFINE_integer(
+  "attempts", 20, "Episodes in which strips look for success.", lower_bound=1
+)
 _UNTIL = flags.DEFINE_bool(
   "until_success", False, "Stop a second after the task's success."
 )
 
 _RATE = 20.0  # control steps a second
+_MOST_CELLS = 100
 
 
 def main() -> None:
   """Plays, renders and writes."""
-  is_play = _COLLECTION.value == "play"
+  rows, columns = _grid()
   task = _TASK.value
+  if task and (_EXPERT.value or _WHAT.value == "reset"):
+    command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
   if _EXPERT.value:
     command.check_choice("expert", _EXPERT.value, (actors.SCRIPTED,))
-    if task:
-      command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
-  elif is_play:
+  elif _COLLECTION.value == "play":
     raise UserError("--collection=play needs --expert=scripted")
+  if _WHAT.value == "strips":
+    _film_strips()
+  elif _WHAT.value == "reset":
+    _picture_of_reset(task or lfgp_dmc.MAIN_TASKS[0], rows, columns)
+  else:
+    _film(task, rows, columns)
+
+
+def _film(task: str, rows: int, columns: int) -> None:
+  """An episode, or a grid of them."""
+  is_play = _COLLECTION.value == "play"
   cast = actors.find(_RUN.value, _EXPERT.value, task)
   task = task or cast.main_task
   if task != playing.SCHEDULED:
     command.check_choice("task", task, (*cast.tasks, playing.SCHEDULED))
-  output = _checked_output(cast.name, "play" if is_play else task)
-  fault = graphics.fault()
-  if fault:
-    raise UserError(fault)
-  clip = _play(cast, task, is_play)
+  output = _checked_output(f"{cast.name}_{'play' if is_play else task}")
+  world = _checked_world(cast.environment, cast.main_task)
+  played = [
+    strips.play(
+      cast,
+      task,
+      seed,
+      _look(rows, columns),
+      is_play=is_play,
+      max_steps=_STEPS.value or None,
+      until_success=_UNTIL.value,
+      environment=world,
+    )
+    for seed in range(_SEED.value, _SEED.value + rows * columns)
+  ]
   metadata = {
     "actor": cast.name,
     "task": task,
     "main_task": cast.main_task,
-    "collection": "play" if is_play else "reset",
-    "seed": _SEED.value,
+    "collection": _COLLECTION.value,
     "camera": _CAMERA.value,
-    "steps": clip.steps,
     "env_step": cast.env_step,
+    **_description(played[0], _SEED.value),
+  }
+  if len(played) > 1:
+    metadata["grid"] = [
+      _description(clip, _SEED.value + i) for i, clip in enumerate(played)
+    ]
+  frames = video.grid([clip.frames for clip in played], columns)
+  if output.suffix == ".png":
+    frames = video.film_strip(frames, _STRIP.value if len(played) == 1 else 1)
+  video.write(output, frames, _RATE / _EVERY.value, metadata)
+  for clip in played:
+    done = ", ".join(f"{k} at step {v}" for k, v in clip.first_success.items())
+    print(f"successes: {done or 'none'}")
+  print(output)
+
+
+def _film_strips() -> None:
+  """A row of frames for each main task."""
+  if _EXPERT.value:
+    casts = [actors.find("", _EXPERT.value, t) for t in lfgp_dmc.MAIN_TASKS]
+    if _TASK.value:
+      casts = [actors.find("", _EXPERT.value, _TASK.value)]
+  else:
+    casts = [actors.find(run, "") for run in _RUN.value.split(",")]
+  output = _checked_output("strips", (".png",))
+  for cast in casts:
+    _checked_world(cast.environment, cast.main_task).close()
+  look = clips.Look(
+    _HEIGHT.value,
+    _WIDTH.value,
+    _CAMERA.value,
+    overlay=False,
+    shadows=_SHADOWS.value,
+  )
+  picture, shown = strips.rows(
+    casts, _SEED.value, look, _STRIP.value, _ATTEMPTS.value
+  )
+  video.write(output, [picture], metadata={"rows": shown})
+  print(output)
+
+
+def _picture_of_reset(task: str, rows: int, columns: int) -> None:
+  """The world after resets, before anybody acts."""
+  output = _checked_output(f"reset_{task}", (".png",))
+  environment = _checked_world("", task)
+  look = _look(rows, columns)
+  clips.prepare(environment, look)
+  pictures = []
+  for seed in range(_SEED.value, _SEED.value + rows * columns):
+    environment.reseed(seeding.derive(seed, "clip"))
+    environment.reset()
+    pictures.append([clips.picture(environment, look)])
+  metadata = {"task": task, "seed": _SEED.value, "camera": _CAMERA.value}
+  video.write(output, video.grid(pictures, columns), metadata=metadata)
+  print(output)
+
+
+def _description(clip: clips.Clip, seed: int) -> dict[str, Any]:
+  return {
+    "seed": seed,
+    "steps": clip.steps,
     "first_success": clip.first_success,
     "intentions": playing.spans(clip.labels, _EVERY.value),
   }
-  frames = clip.frames
-  if output.suffix == ".png":
-    frames = video.film_strip(frames, _STRIP.value)
-  video.write(output, frames, _RATE / _EVERY.value, metadata)
-  done = ", ".join(f"{k} at step {v}" for k, v in clip.first_success.items())
-  print(f"successes: {done or 'none'}\n{output}")
 
 
-def _play(cast: actors.Cast, task: str, is_play: bool) -> clips.Clip:
-  """One episode of the intention, of play, or of the whole agent."""
-  seed = _SEED.value
-  environment = worlds.build(
-    cast.environment, cast.main_task, seed=seeding.derive(seed, "clip")
-  )
-  cameras = playing.cameras(environment)
-  command.check_choice("camera", _CAMERA.value, cameras)
-  choose = playing.make_switch(cast, task, is_play, environment, seed)
-  look = clips.Look(
-    _HEIGHT.value, _WIDTH.value, _CAMERA.value, _EVERY.value, _OVERLAY.value
-  )
-  return clips.record(
-    environment,
-    cast.make(),
-    environment.reset(),
-    choose,
-    seed,
-    look,
-    _STEPS.value or None,
-    task if _UNTIL.value else None,
+def _look(rows: int, columns: int) -> clips.Look:
+  return clips.Look(
+    max(32, _HEIGHT.value // rows),
+    max(32, _WIDTH.value // columns),
+    _CAMERA.value,
+    _EVERY.value,
+    _OVERLAY.value,
+    _SHADOWS.value,
   )
 
 
-def _checked_output(name: str, task: str) -> pathlib.Path:
-  """Where the clip goes.
+def _grid() -> tuple[int, int]:
+  match = re.fullmatch(r"([1-9]\d?)x([1-9]\d?)", _GRID.value)
+  if not match or np.prod([int(n) for n in match.groups()]) > _MOST_CELLS:
+    raise UserError(
+      f"--grid={_GRID.value}; valid: ROWSxCOLUMNS, at most {_MOST_CELLS} cells"
+    )
+  return int(match[1]), int(match[2])
+
+
+def _checked_world(environment: str, main_task: str):
+  """The environment, if it can be drawn by the camera asked for."""
+  fault = graphics.fault()
+  if fault:
+    raise UserError(fault)
+  world = worlds.build(environment, main_task)
+  command.check_choice("camera", _CAMERA.value, playing.cameras(world))
+  return world
+
+
+def _checked_output(
+  stem: str, formats: tuple[str, ...] = video.FORMATS
+) -> pathlib.Path:
+  """Where the picture goes.
 
   Raises:
     UserError: an unknown suffix, or the file exists.
   """
-  stem = f"{name}_{task}".replace(" ", "_")
-  output = pathlib.Path(_OUTPUT.value or f"videos/{stem}.mp4")
-  if output.suffix not in video.FORMATS:
+  default = f"videos/{stem}{formats[0]}".replace(" ", "_")
+  output = pathlib.Path(_OUTPUT.value or default)
+  if output.suffix not in formats:
     raise UserError(
-      f"--output={output}: unknown format; valid: {', '.join(video.FORMATS)}"
+      f"--output={output}: unknown format; valid: {', '.join(formats)}"
     )
   if output.exists():
     raise UserError(f"{output} exists; choose another --output")

@@ -69,6 +69,36 @@ def film_strip(frames: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
   return [frames[round(i)] for i in picked]
 
 
+def grid(
+  clips: Sequence[Sequence[np.ndarray]], columns: int
+) -> list[np.ndarray]:
+  """Plays clips side by side; the shorter ones hold their last frame.
+
+  Args:
+    clips: frames uint8 [height, width, 3], all of one size; at least one each.
+    columns: clips in a row; the last row is filled up with white.
+
+  Returns:
+    Frames uint8 [rows * height, columns * width, 3], as many as the longest
+    clip has.
+  """
+  blank = np.full_like(clips[0][0], 255)
+  rows = -(-len(clips) // columns)
+  frames = []
+  for i in range(max(map(len, clips))):
+    now = [clip[min(i, len(clip) - 1)] for clip in clips]
+    now += [blank] * (rows * columns - len(now))
+    frames.append(
+      np.concatenate(
+        [
+          np.concatenate(now[row * columns : (row + 1) * columns], axis=1)
+          for row in range(rows)
+        ]
+      )
+    )
+  return frames
+
+
 def label(
   frame: np.ndarray, left: str, right: str = "", highlight: bool = False
 ) -> np.ndarray:

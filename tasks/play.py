@@ -179,6 +179,7 @@ class PlayTask(composer.Task):
     self._holds.clear()
     self._is_out = [False, False]
     self._observe(physics, moved=False)
+    self._light_zones(physics)
 
   def _is_fair(self, physics) -> bool:
     """No main task is done, and nothing is wedged, toppled or lost."""
@@ -211,6 +212,9 @@ class PlayTask(composer.Task):
     """Takes the 59 floats once, for every observable to slice."""
     self._features = self.world.reader.features(physics)
     self._count_blocks_out()
+    self._light_zones(physics)
+
+  def _light_zones(self, physics) -> None:
     for zone, xy, block in (
       (self.world.zones["blue"], ws.BLUE_XY, self._snapshot.blue),
       (self.world.zones["green"], ws.GREEN_XY, self._snapshot.green),

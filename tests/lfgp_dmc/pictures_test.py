@@ -38,6 +38,15 @@ class VideoTest(parameterized.TestCase):
     path = video.write(self._folder / "strip.png", frames)
     self.assertEqual(imageio.imread(path).shape, (47, 3 * 63, 3))
 
+  def test_a_grid_of_clips(self):
+    long, short = _frames(8, 20, 30), _frames(3, 20, 30)
+    frames = video.grid([long, short, short], columns=2)
+    self.assertLen(frames, 8)
+    self.assertEqual(frames[0].shape, (40, 60, 3))
+    np.testing.assert_array_equal(frames[7][:20, :30], long[7])
+    np.testing.assert_array_equal(frames[7][:20, 30:], short[2])
+    self.assertTrue((frames[0][20:, 30:] == 255).all())
+
   def test_a_label_is_drawn_on_a_copy(self):
     frame = np.full((240, 320, 3), 200, np.uint8)
     labelled = video.label(frame, "reach", "step 12", highlight=True)
