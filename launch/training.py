@@ -302,6 +302,8 @@ def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
   pace = {}
   if not ALGORITHMS[config.algorithm].is_supervised:
     pace["warmup_steps"] = config.agent.warm_up
+    if config.transfer_from:  # there is a replay from the start
+      pace["warmup_steps"] = min(config.agent.warm_up, config.agent.batch_size)
     pace["updates_per_step"] = config.agent.updates_per_step
   return loop.TrainSchedule(
     env_steps=config.env_steps,

@@ -8,6 +8,7 @@ from agents import field_checks, rewards, schedulers
 from agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
+MIXINGS = ("float", "row")  # of replay and expert rows, for the penalty
 # Where rewards come from: the discriminators; the replay, which stores dense
 # rewards (SAC-X); examples of success, +1 for a task's own and -1 for all else.
 REWARD_SOURCES = ("discriminator", "replay", "examples")
@@ -65,6 +66,7 @@ class LfgpConfig:
   discriminator_final_share: float = 0.0  # of expert pairs, rows of success
   gradient_penalty: float = 10.0  # lambda
   gradient_penalty_per_task: bool = False
+  gradient_penalty_mixing: str = "float"  # a share for each; "row": one for all
 
   # Scheduler.
   scheduler: str = "q_table"
@@ -210,6 +212,7 @@ _RANGES = {
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,
   "discriminator_input": discriminator.INPUTS,
+  "gradient_penalty_mixing": MIXINGS,
   "layout": layouts.LAYOUTS,
   "reward": tuple(rewards.VARIANTS),
   "reward_source": REWARD_SOURCES,

@@ -48,8 +48,11 @@ class DiscriminatorLearner:
     tasks, rows = expert.action.shape[:2]
     policy_pairs = network.join(self._disturb(batch.inputs), batch.action)
     expert_pairs = network.join(self._disturb(expert.inputs), expert.action)
+    width = expert_pairs.shape[2]
+    if config.gradient_penalty_mixing == "row":
+      width = 1
     share = torch.rand(
-      expert_pairs.shape, generator=self._generator, device=self._device
+      (tasks, rows, width), generator=self._generator, device=self._device
     )
     with self._autocast():
       logits = network(torch.cat([policy_pairs, expert_pairs.flatten(0, 1)]))

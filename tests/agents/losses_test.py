@@ -55,6 +55,8 @@ class DiscriminatorLossTest(absltest.TestCase):
     share = torch.tensor([[[0.5, 0.25], [1.0, 0.0], [1.0, 0.5]]])
     mixed = discriminator.mix(policy, expert, share)
     self.assertEqual(mixed.tolist(), [[[0.5, 0.25], [2.0, 0.0], [1.0, 0.5]]])
+    mixed = discriminator.mix(policy, expert, share[..., :1])
+    self.assertEqual(mixed.tolist(), [[[0.5, 0.5], [2.0, 2.0], [1.0, 1.0]]])
 
 
 class CriticLossTest(absltest.TestCase):

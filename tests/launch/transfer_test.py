@@ -141,6 +141,7 @@ class TransferTest(_RunTest):
         else str(self.folder / "other"),
         "transfer_from": str(source),
         "agent.transfer_updates": 7,
+        "agent.warm_up": 150,
         **changes,
       },
     )
