@@ -83,7 +83,9 @@ class DemoTest(absltest.TestCase):
       str(folder),
     )
     self.assertEqual(done.returncode, 0, done.stderr)
-    self.assertRegex(done.stdout, r"task +untrained +warm start +trained +expert\nstack")
+    self.assertRegex(
+      done.stdout, r"task +untrained +warm start +trained +expert\nstack"
+    )
     self.assertIn("total time", done.stdout)
     self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
     if not graphics.fault():
