@@ -14,6 +14,7 @@ With --engine=ray the runs go to a Ray cluster that shares the runs' folder.
 
 import collections
 import pathlib
+import signal
 import time
 from collections.abc import Sequence
 
@@ -198,9 +199,13 @@ def _last_words(log: pathlib.Path, status: int) -> tuple[str, bool]:
   """Why a run ended, and whether another attempt may end otherwise."""
   lines = []
   if log.is_file():
-    lines = log.read_text(encoding="utf-8", errors="replace").split("\n")
-  told = [line for line in lines if line.strip()][-1:] or [""]
-  message = f"exit status {status}: {told[0].strip()[:200]}"
+    # Progress bars go back to the line's start.
+    text = log.read_text(encoding="utf-8", errors="replace")
+    lines = [line.rpartition("\r")[2] for line in text.split("\n")]
+  if status < 0:
+    return f"killed by {signal.Signals(-status).name}", True
+  told = [line.strip() for line in lines if line.strip()][-1:] or [""]
+  message = f"exit status {status}: {told[0][:200]}"
   errors = [i for i, line in enumerate(lines) if line.startswith("error: ")]
   # What a command tells in a line is the input's fault: it will stay so.
   is_told = bool(errors) and not any(

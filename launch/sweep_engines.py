@@ -16,6 +16,8 @@ from typing import Protocol
 from launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
+_POLL = 0.2  # s
+_KILL = "kill"  # in a stop file; an empty one asks for a checkpoint first
 _VARIABLES = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
@@ -69,7 +71,7 @@ class LocalEngine:
   def interrupt(self) -> None:
     """See `Engine`."""
     for process in self._running.values():
-      process.send_signal(signal.SIGINT)
+      process.terminate()
 
   def kill(self) -> None:
     """See `Engine`."""
@@ -111,9 +113,12 @@ class RayEngine:
     # A run that is lost with its node is the sweep's to start again.
     self._run = ray.remote(num_cpus=1, max_retries=0)(_train_and_wait)
     self._running: dict[str, object] = {}
+    self._stops: dict[str, pathlib.Path] = {}
 
   def start(self, name, arguments, log) -> None:
     """See `Engine`."""
+    _stop_file(log).unlink(missing_ok=True)
+    self._stops[name] = _stop_file(log)
     self._running[name] = self._run.remote(list(arguments), str(log))
 
   def ended(self) -> Mapping[str, int]:
@@ -135,13 +140,19 @@ class RayEngine:
 
   def interrupt(self) -> None:
     """See `Engine`."""
-    for reference in self._running.values():
-      self._ray.cancel(reference, force=False)  # KeyboardInterrupt over there
+    for name in self._running:  # Ray workers block SIGINT, so cancel() fails
+      self._stops[name].touch()
 
   def kill(self) -> None:
     """See `Engine`."""
-    for reference in self._running.values():
-      self._ray.cancel(reference, force=True)
+    for name in self._running:
+      self._stops[name].write_text(_KILL, encoding="utf-8")
+    time.sleep(5 * _POLL)  # until the workers have seen it
+
+
+def _stop_file(log: str | pathlib.Path) -> pathlib.Path:
+  """Where the sweep asks a run on another machine to stop."""
+  return pathlib.Path(log).with_suffix(".stop")
 
 
 def popen(arguments: Sequence[str], log: pathlib.Path) -> subprocess.Popen:
@@ -165,11 +176,13 @@ def popen(arguments: Sequence[str], log: pathlib.Path) -> subprocess.Popen:
 
 def _train_and_wait(arguments: list[str], log: str) -> int:
   """What a Ray worker does for one run."""
+  stop = _stop_file(log)
   process = popen(arguments, pathlib.Path(log))
-  try:
-    while process.poll() is None:
-      time.sleep(0.2)
-  except KeyboardInterrupt:  # the sweep's `interrupt`
-    process.send_signal(signal.SIGINT)
-    process.wait()
+  while process.poll() is None:
+    if stop.exists():
+      if stop.read_text(encoding="utf-8") == _KILL:
+        os.killpg(process.pid, signal.SIGKILL)
+      process.terminate()
+      stop.unlink()
+    time.sleep(_POLL)
   return process.returncode

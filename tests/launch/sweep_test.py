@@ -106,7 +106,7 @@ class SweepTest(absltest.TestCase):
     self.assertEqual(by_name["lfgp_stack_0"]["attempts"], "2")
     self.assertEqual(by_name["lfgp_bring_0"]["message"], "error: bad input")
     self.assertEqual(by_name["lfgp_stack_1"]["message"],
-                     "exit status -9: Killed")  # fmt: skip
+                     "killed by SIGKILL")  # fmt: skip
 
   def test_a_transfer_waits_for_its_source(self):
     start = "lfgp_transfer_stack:lfgp_move_object:config.from"
