@@ -59,6 +59,32 @@ SUCCESS_PREFIX = "success/"
 CONDITION_PREFIX = "condition/"
 
 
+# The components one after the other: where each starts and ends, where in the
+# 59 each of its floats is, and the way back.
+_BOUNDS: dict[str, slice] = {}
+_end = 0
+for _name, _part in OBSERVATION_SLICES.items():
+  _BOUNDS[_name] = slice(_end, _end + _part.size)
+  _end += _part.size
+_GROUPED = np.concatenate(
+  [np.r_[part.slices] for part in OBSERVATION_SLICES.values()]
+)
+_FLAT = np.argsort(_GROUPED)
+
+
+def components(flat: np.ndarray) -> dict[str, np.ndarray]:
+  """Splits the 59 into the named components; the inverse of `flatten`.
+
+  Args:
+    flat: float32 [59], in the order of the released code.
+
+  Returns:
+    Component name -> float32 [size].
+  """
+  grouped = flat[_GROUPED]
+  return {name: grouped[bounds] for name, bounds in _BOUNDS.items()}
+
+
 def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   """Lays the named observables out in the order of the released code.
 
@@ -71,21 +97,14 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   Raises:
     KeyError: a component is missing (vision leaves the privileged ones out).
   """
-  flat = np.empty(OBSERVATION_SIZE, np.float32)
-  for name, component in OBSERVATION_SLICES.items():
-    try:
-      value = observation[name]
-    except KeyError:
-      raise KeyError(
-        f"observation lacks {name!r}; the 59 floats need "
-        f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
-      ) from None
-    start = 0
-    for part in component.slices:
-      stop = start + part.stop - part.start
-      flat[part] = value[start:stop]
-      start = stop
-  return flat
+  try:
+    parts = [observation[name] for name in _BOUNDS]
+  except KeyError as error:
+    raise KeyError(
+      f"observation lacks {error}; the 59 floats need "
+      f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
+    ) from None
+  return np.concatenate(parts, dtype=np.float32)[_FLAT]
 
 
 def successes(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:

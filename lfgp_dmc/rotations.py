@@ -33,16 +33,20 @@ def _right_matrix(quat) -> np.ndarray:
 _SYMMETRIES = np.stack([_right_matrix(quat) for quat in _cube_rotations()])
 
 
+_TO_COSINES = np.ascontiguousarray(_SYMMETRIES[:, 0].T)  # [4, 24]
+
+
 def reduce_rotation(quat: np.ndarray) -> np.ndarray:
   """The equal-looking rotation of a cube with the smallest angle.
 
   Args:
-    quat: unit quaternion w x y z, float [4].
+    quat: unit quaternions w x y z, float [..., 4].
 
   Returns:
-    float [4], w > 0; among ties the cube rotation of the lowest index.
+    float [..., 4], w > 0; among ties the cube rotation of the lowest index.
   """
-  candidates = _SYMMETRIES @ quat
+  cosines = np.abs(quat @ _TO_COSINES)
   # Rounded, so that a tie is a tie and not the last bit's toss-up.
-  best = candidates[np.argmax(np.abs(candidates[:, 0]).round(9))]
-  return best if best[0] >= 0 else -best
+  best = _SYMMETRIES[np.argmax(cosines.round(9), axis=-1)]
+  reduced = (best @ quat[..., None])[..., 0]
+  return np.where(reduced[..., :1] < 0, -reduced, reduced)

@@ -16,8 +16,7 @@ from tasks.entities import Block, Panda, Tray
 from tasks.entities.panda_links import FINGER_TRAVEL
 from tasks.snapshot import Snapshot
 
-_FORCE_SCALE = 100.0  # N
-_TORQUE_SCALE = 10.0  # N m
+_WRENCH_SCALE = np.array([100.0] * 3 + [10.0] * 3)  # N, N m
 
 # Bits of the contact table: who a geom belongs to.
 _BLUE, _GREEN, _TRAY, _ROBOT = 1, 2, 4, 8
@@ -42,7 +41,8 @@ class FeatureReader:
     self._tcp = address(sensors["tcp_position"])
     self._tcp_velocity = address(sensors["tcp_velocity"])
     self._finger = address(sensors["left_finger"])
-    self._force = address(sensors["force"])
+    force = address(sensors["force"])  # and the torque behind it
+    self._wrench = slice(force, force + 6)
     block_parts = (
       "position",
       "rotation",
@@ -53,6 +53,10 @@ class FeatureReader:
       {name: address(block.sensors[name]) for name in block_parts}
       for block in (self._blue, self._green)
     ]
+    self._rotations = np.array(
+      [range(part["rotation"], part["rotation"] + 4) for part in self._blocks]
+    )
+    self._map_linear_part(model.nsensordata)
     free_joint = mjcf.get_frame_freejoint(self._blue.mjcf_model)
     dof = int(np.asarray(model.jnt_dofadr)[physics.bind(free_joint).element_id])
     self._blue_dofs = slice(dof, dof + 3)
@@ -78,11 +82,11 @@ class FeatureReader:
     wrist = physics.bind(self._panda.wrist)
     centre = np.average(np.array(bodies.xipos), axis=0, weights=bodies.mass)
     frame = np.array(wrist.xmat).reshape(3, 3)
-    self._lever = frame.T @ (centre - np.array(wrist.xpos))
+    self._lever = (frame.T @ (centre - np.array(wrist.xpos))).tolist()
 
   def reset_history(self, fingers: np.ndarray) -> None:
     """Fills the fingers' history with a reading, float [2], 0..1."""
-    self._finger_history = [fingers, fingers]
+    self._finger_history = np.concatenate([fingers, fingers])
 
   def snapshot(self, physics: mjcf.Physics, action, moved: bool) -> Snapshot:
     """The world now; `moved` is False at reset, where accelerations are 0."""
@@ -124,53 +128,48 @@ class FeatureReader:
   def features(self, physics: mjcf.Physics) -> np.ndarray:
     """The 59 floats of the contract, float32 [59]; call once a control step."""
     sensed = physics.data.ptr.sensordata
-    out = np.empty(OBSERVATION_SIZE)
-    tcp, finger = self._tcp, self._finger
-    out[0:3] = sensed[tcp : tcp + 3]
-    out[3:6] = sensed[self._tcp_velocity : self._tcp_velocity + 3]
-    fingers = sensed[finger : finger + 2] / FINGER_TRAVEL
-    out[6:8] = fingers
-    out[8:10], out[10:12] = self._finger_history
-    self._finger_history = [self._finger_history[1], fingers]
-    for block, pose, velocity in (
-      (self._blocks[0], 12, 26),
-      (self._blocks[1], 19, 32),
-    ):
-      start = block["position"]
-      out[pose : pose + 3] = sensed[start : start + 3]
-      start = block["rotation"]
-      out[pose + 3 : pose + 7] = reduce_rotation(sensed[start : start + 4])
-      start = block["linear_velocity"]
-      out[velocity : velocity + 3] = sensed[start : start + 3]
-      start = block["angular_velocity"]
-      out[velocity + 3 : velocity + 6] = sensed[start : start + 3]
-    out[38:41] = out[12:15] - out[0:3]
-    out[41:44] = out[19:22] - out[0:3]
-    out[44:47] = out[19:22] - out[12:15]
-    out[47:50] = _BLUE_SLOT - out[12:15]
-    out[50:53] = _GREEN_SLOT - out[19:22]
+    out = self._matrix @ sensed
+    out += self._offset
+    out[8:12] = self._finger_history
+    self._finger_history = np.concatenate([out[10:12], out[6:8]])
+    blue, green = reduce_rotation(sensed[self._rotations])
+    out[15:19], out[22:26] = blue, green
     out[53:59] = self._force_torque(physics, sensed)
     return out.astype(np.float32)
 
+  def _map_linear_part(self, size: int) -> None:
+    """Makes `matrix @ sensordata + offset`: all but turns, history, forces."""
+    blue, green = self._blocks
+    matrix = np.zeros((OBSERVATION_SIZE, size))
+    offset = np.zeros(OBSERVATION_SIZE)
+
+    def add(row: int, start: int, count: int = 3, factor: float = 1.0):
+      for index in range(count):
+        matrix[row + index, start + index] += factor
+
+    add(0, self._tcp)
+    add(3, self._tcp_velocity)
+    add(6, self._finger, 2, 1.0 / FINGER_TRAVEL)
+    for block, pose, velocity, from_tcp, to_slot, slot in (
+      (blue, 12, 26, 38, 47, ws.BLUE_SLOT),
+      (green, 19, 32, 41, 50, ws.GREEN_SLOT),
+    ):
+      add(pose, block["position"])
+      add(velocity, block["linear_velocity"])
+      add(velocity + 3, block["angular_velocity"])
+      add(from_tcp, block["position"])
+      add(from_tcp, self._tcp, factor=-1.0)
+      add(to_slot, block["position"], factor=-1.0)
+      offset[to_slot : to_slot + 3] = slot
+    add(44, green["position"])
+    add(44, blue["position"], factor=-1.0)
+    self._matrix, self._offset = matrix, offset
+
   def _force_torque(self, physics, sensed) -> np.ndarray:
     """Tanh of what the wrist carries beyond its own hand, float [6]."""
-    frame = physics.data.ptr.site_xmat[self._wrist_id]
+    frame = physics.data.ptr.site_xmat[self._wrist_id, 6:9].tolist()
     # The sensor reads what holds the hand up: minus the weight, in its frame.
-    held = self._weight * frame[6:9]
+    a, b, c = (self._weight * axis for axis in frame)
     x, y, z = self._lever
-    torque = (
-      y * held[2] - z * held[1],
-      z * held[0] - x * held[2],
-      x * held[1] - y * held[0],
-    )
-    start = self._force
-    out = np.array(sensed[start : start + 6])
-    out[:3] -= held
-    out[3:] -= torque
-    out[:3] /= _FORCE_SCALE
-    out[3:] /= _TORQUE_SCALE
-    return np.tanh(out)
-
-
-_BLUE_SLOT = np.array(ws.BLUE_SLOT)
-_GREEN_SLOT = np.array(ws.GREEN_SLOT)
+    held = (a, b, c, y * c - z * b, z * a - x * c, x * b - y * a)
+    return np.tanh((sensed[self._wrench] - held) / _WRENCH_SCALE)

@@ -2,6 +2,7 @@
 
 import functools
 import math
+import operator
 
 import numpy as np
 from dm_control import composer
@@ -12,6 +13,7 @@ from lfgp_dmc.observations import (
   CONDITION_PREFIX,
   OBSERVATION_SLICES,
   SUCCESS_PREFIX,
+  components,
 )
 from lfgp_dmc.task_names import MAIN_TASKS
 from tasks import control, initialisers
@@ -30,8 +32,20 @@ _PHYSICS_STEP = 0.005  # s
 _SETTLE_STEPS = 100
 _MOST_ATTEMPTS = 200
 _NO_ACTION = np.zeros(control.ACTION_SIZE)
-_TRUE, _FALSE = np.array(True), np.array(False)
-_TRUE.flags.writeable = _FALSE.flags.writeable = False  # handed out as they are
+_FLAGS = (np.array(False), np.array(True))
+for _flag in _FLAGS:
+  _flag.flags.writeable = False  # handed out as they are
+
+
+class _Published(observable.Generic):
+  """Shows one entry of the dictionary that the task fills once a step."""
+
+  def __init__(self, published: dict[str, np.ndarray], name: str):
+    self._read = functools.partial(operator.getitem, published, name)
+    super().__init__(lambda physics: self._read())
+
+  def _callable(self, physics):
+    return self._read  # no Python between a caller and the entry
 
 
 class PlayTask(composer.Task):
@@ -62,6 +76,9 @@ class PlayTask(composer.Task):
     self.set_timesteps(
       control_timestep=1.0 / control_hz, physics_timestep=_PHYSICS_STEP
     )
+    self._published: dict[str, np.ndarray] = {}
+    self._success_names = [SUCCESS_PREFIX + name for name in GOALS]
+    self._condition_names = [CONDITION_PREFIX + name for name in GOALS]
     self._task_observables = self._make_observables(observations)
 
   # What the task is made of.
@@ -82,16 +99,12 @@ class PlayTask(composer.Task):
     made: dict[str, observable.Observable] = {}
     vision = observations == "vision"
     for name, component in OBSERVATION_SLICES.items():
-      read = functools.partial(self._read_component, component.slices)
-      made[name] = observable.Generic(read)
+      made[name] = _Published(self._published, name)
       made[name].enabled = not (vision and component.privileged)
-    for index, name in enumerate(GOALS):
-      read_success = functools.partial(self._read_success, index)
-      made[SUCCESS_PREFIX + name] = observable.Generic(read_success)
-      read_condition = functools.partial(self._read_condition, index)
-      made[CONDITION_PREFIX + name] = observable.Generic(read_condition)
-      made[SUCCESS_PREFIX + name].enabled = True
-      made[CONDITION_PREFIX + name].enabled = True
+    for name in (*self._success_names, *self._condition_names):
+      made[name] = _Published(self._published, name)
+      made[name].enabled = True
+    for name in GOALS:
       read_reward = functools.partial(self._read_reward, name)
       made[REWARD_PREFIX + name] = observable.Generic(read_reward)
     camera = self.world.arena.mjcf_model.find("camera", FRONT_CAMERA)
@@ -101,16 +114,16 @@ class PlayTask(composer.Task):
     made[CAMERA_OBSERVABLE].enabled = vision
     return made
 
-  def _read_component(self, slices, physics) -> np.ndarray:
-    if len(slices) == 1:
-      return self._features[slices[0]]
-    return np.concatenate([self._features[part] for part in slices])
+  def _publish(self, physics) -> None:
+    """Takes the 59 floats once, for every observable to show its part."""
+    self._published.update(components(self.world.reader.features(physics)))
+    self._publish_flags()
 
-  def _read_success(self, index: int, physics) -> np.ndarray:
-    return _TRUE if self._holds.successes[index] else _FALSE
-
-  def _read_condition(self, index: int, physics) -> np.ndarray:
-    return _TRUE if self._conditions[index] else _FALSE
+  def _publish_flags(self) -> None:
+    successes = map(_FLAGS.__getitem__, self._holds.successes)
+    self._published.update(zip(self._success_names, successes, strict=True))
+    conditions = map(_FLAGS.__getitem__, self._conditions)
+    self._published.update(zip(self._condition_names, conditions, strict=True))
 
   def _read_reward(self, name: str, physics) -> np.ndarray:
     return np.array(sum(self.reward_terms(name).values()))
@@ -210,7 +223,7 @@ class PlayTask(composer.Task):
 
   def after_step(self, physics, random_state) -> None:
     """Takes the 59 floats once, for every observable to slice."""
-    self._features = self.world.reader.features(physics)
+    self._publish(physics)
     self._count_blocks_out()
     self._light_zones(physics)
 
@@ -223,7 +236,7 @@ class PlayTask(composer.Task):
 
   def _observe(self, physics, moved: bool) -> None:
     self._look(physics, moved)
-    self._features = self.world.reader.features(physics)
+    self._publish(physics)
 
   def _look(self, physics, moved: bool) -> None:
     self._snapshot = self.world.reader.snapshot(physics, self._action, moved)
@@ -248,6 +261,7 @@ class PlayTask(composer.Task):
   def clear_success(self) -> None:
     """Restarts every hold and latch."""
     self._holds.clear()
+    self._publish_flags()
 
   def reward_terms(self, name: str) -> dict[str, float]:
     """The named terms of the dense reward of task `name`, at this instant."""
