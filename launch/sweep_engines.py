@@ -18,6 +18,7 @@ from launch.command import UserError
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
 _POLL = 0.2  # s
 _KILL = "kill"  # in a stop file; an empty one asks for a checkpoint first
+_KILL = "kill"  # in a stop file; an empty one asks for a checkpoint first
 _VARIABLES = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",

@@ -4,13 +4,9 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import lfgp_dmc
 from agents import bc, lfgp
 from agents.bc import BcAgent, BcConfig
 from agents.lfgp import LfgpAgent, LfgpConfig
-
-# `move_object` is the paper's pre-training task for transfer.
-MAIN_TASKS = (*lfgp_dmc.MAIN_TASKS, "move_object")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 from launch.configs import algorithms
+from lfgp_dmc.task_names import ALL_TASKS
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -67,10 +68,9 @@ class RunConfig:
         f"config.environment is {self.environment!r}; valid: nothing (the "
         "block tasks) or package.module:factory"
       )
-    if not self.environment and self.main_task not in algorithms.MAIN_TASKS:
+    if not self.environment and self.main_task not in ALL_TASKS:
       faults.append(
-        f"config.main_task is {self.main_task!r}; valid: "
-        f"{', '.join(algorithms.MAIN_TASKS)}"
+        f"config.main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
       )
     if faults:
       raise ValueError("\n".join(faults))

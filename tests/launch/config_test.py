@@ -69,7 +69,7 @@ class ConfigTest(parameterized.TestCase):
     ("--config.nothing_like_it=1", "unknown --config.nothing_like_it"),
     ("--preset=quick", "unknown preset 'quick'; valid: paper, ral, fast"),
     ("--config.algorithm=dqn", "unknown algorithm 'dqn'; valid: lfgp"),
-    ("--config.main_task=reach", "config.main_task is 'reach'; valid: stack"),
+    ("--config.main_task=juggle", "config.main_task is 'juggle'; valid: stack"),
     ("--config.env_steps=0", "config.env_steps is 0; valid: 1 or more"),
     ("--config.agent.xi=0", "xi is 0; valid: an integer above 0"),
     ("--config.environment=toy", "config.environment is 'toy'; valid"),
