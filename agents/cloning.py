@@ -10,7 +10,11 @@ from agents import serialisation
 from agents.experts import ExpertBatch
 from agents.losses.behaviour_cloning import behaviour_cloning_loss
 from agents.networks.intentions import IntentionNetwork
-from agents.optimisation import clipped_step, make_optimiser
+from agents.optimisation import (
+  clipped_step,
+  make_optimiser,
+  product_dtype,
+)
 
 
 class IntentionCloner:
@@ -39,13 +43,11 @@ class IntentionCloner:
       self._parameters, learning_rate, weight_decay
     )
     self._max_gradient_norm = max_gradient_norm
-    self._bfloat16 = bfloat16
+    self._dtype = product_dtype(bfloat16)
 
   def loss(self, batch: ExpertBatch) -> tuple[torch.Tensor, dict]:
     """The loss of a batch; see `behaviour_cloning_loss`."""
-    device = batch.inputs.device.type
-    with torch.autocast(device, torch.bfloat16, enabled=self._bfloat16):
-      mean, _ = self._network(batch.inputs)
+    mean, _ = self._network(batch.inputs.to(self._dtype))
     return behaviour_cloning_loss(mean, batch.action)
 
   def update(self, batch: ExpertBatch) -> dict[str, torch.Tensor]:

@@ -7,6 +7,11 @@ import torch
 from torch import nn
 
 
+def product_dtype(bfloat16: bool) -> torch.dtype:
+  """The dtype of inputs, and so of the products that layers make with them."""
+  return torch.bfloat16 if bfloat16 else torch.float32
+
+
 def make_optimiser(
   parameters: Sequence[nn.Parameter],
   learning_rate: float,

@@ -15,7 +15,7 @@ class BcConfig:
   layout: str = layouts.SEPARATE  # multitask BC: "shared_trunk"
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
   deviation_floor: float = 0.01  # smallest deviation, in the input's unit
-  bfloat16: bool = False  # products in bfloat16 (autocast)
+  bfloat16: bool = False  # products in bfloat16; parameters stay float32
 
   # Training.
   batch_size: int = 256  # pairs a task

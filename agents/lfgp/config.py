@@ -32,7 +32,7 @@ class LfgpConfig:
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
   deviation_floor: float = 0.01  # smallest deviation, in the input's unit
   absorbing_flag: bool = False  # a last input, 0: no state is absorbing here
-  bfloat16: bool = False  # products in bfloat16 (autocast)
+  bfloat16: bool = False  # products in bfloat16; parameters stay float32
 
   # Intentions and critics.
   batch_size: int = 256

@@ -10,7 +10,7 @@ from agents.losses.discriminator import (
   mix,
 )
 from agents.networks.discriminator import Discriminator
-from agents.optimisation import make_optimiser
+from agents.optimisation import make_optimiser, product_dtype
 from agents.rewards import reward_from_logits
 
 Metrics = dict[str, torch.Tensor]
@@ -41,6 +41,7 @@ class DiscriminatorLearner:
     self._network = network
     self._generator = generator
     self._device = network.output.weight.device
+    self._dtype = product_dtype(config.bfloat16)
 
   def update(self, batch: Batch, expert: ExpertBatch) -> Metrics:
     """One update, penalty included; see `LfgpLearner.update_discriminator`."""
@@ -54,12 +55,13 @@ class DiscriminatorLearner:
     share = torch.rand(
       (tasks, rows, width), generator=self._generator, device=self._device
     )
-    with self._autocast():
-      logits = network(torch.cat([policy_pairs, expert_pairs.flatten(0, 1)]))
-      gradient = network.input_gradient(
-        mix(policy_pairs, expert_pairs, share),
-        config.gradient_penalty_per_task,
-      )
+    mixed = mix(policy_pairs, expert_pairs, share)
+    pairs = torch.cat([policy_pairs, expert_pairs.flatten(0, 1)])
+    logits, gradient = network.logits_and_gradient(
+      pairs.to(self._dtype),
+      mixed.to(self._dtype),
+      config.gradient_penalty_per_task,
+    )
     policy_rows = policy_pairs.shape[0]
     own = logits[policy_rows:].view(tasks, rows, tasks)
     loss, metrics = discriminator_loss(
@@ -74,8 +76,8 @@ class DiscriminatorLearner:
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Every task's reward [K, B] of inputs [B, O] and actions [B, A]."""
     config, network = self._config, self._network
-    with torch.no_grad(), self._autocast():
-      logits = network(network.join(inputs, action))
+    with torch.no_grad():
+      logits = network(network.join(inputs, action).to(self._dtype))
     return reward_from_logits(
       logits.t(), config.reward, config.reward_clip, config.reward_scale
     )
@@ -88,8 +90,3 @@ class DiscriminatorLearner:
       inputs.shape, generator=self._generator, device=self._device
     )
     return inputs + self._config.discriminator_noise * noise
-
-  def _autocast(self) -> torch.autocast:
-    return torch.autocast(
-      self._device.type, torch.bfloat16, enabled=self._config.bfloat16
-    )

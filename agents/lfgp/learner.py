@@ -21,7 +21,13 @@ from agents.losses.critic import (
 from agents.losses.intention import intention_loss
 from agents.losses.temperature import temperature_loss
 from agents.networks import tanh_gaussian
-from agents.optimisation import clipped_step, frozen, make_optimiser, polyak
+from agents.optimisation import (
+  clipped_step,
+  frozen,
+  make_optimiser,
+  polyak,
+  product_dtype,
+)
 from agents.rewards import bounded, reward_from_examples
 from agents.value_bounds import ValueBounds
 
@@ -51,6 +57,7 @@ class LfgpLearner:
     self._config = config
     self._generator = generator
     self._device = networks.log_temperature.device
+    self._dtype = product_dtype(config.bfloat16)
     self._critic_parameters = list(networks.critics.parameters())
     self._policy_parameters = networks.intentions.trained_parameters()
     decay = config.weight_decay
@@ -157,17 +164,19 @@ class LfgpLearner:
     """Gives each example of success an action of its task's intention."""
     assert batch.owner is not None
     at = torch.nonzero(batch.owner >= 0)[:, 0]
-    with torch.no_grad(), self._autocast():
-      action, _ = self._sample(*self.networks.intentions(batch.inputs[at]))
+    with torch.no_grad():
+      inputs = batch.inputs[at].to(self._dtype)
+      action, _ = self._sample(*self.networks.intentions(inputs))
     own = action[batch.owner[at], torch.arange(len(at), device=self._device)]
     return batch._replace(action=batch.action.index_copy(0, at, own))
 
   def _update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
     networks, config = self.networks, self._config
-    with torch.no_grad(), self._autocast():
-      mean, deviation = networks.intentions(batch.next_inputs)
+    with torch.no_grad():
+      next_inputs = batch.next_inputs.to(self._dtype)
+      mean, deviation = networks.intentions(next_inputs)
       action, log_prob = self._sample(mean, deviation)
-      next_q = networks.target_critics(batch.next_inputs, action)
+      next_q = networks.target_critics(next_inputs, action)
       target = soft_bellman_target(
         reward,
         next_q,
@@ -175,8 +184,7 @@ class LfgpLearner:
         networks.log_temperature.exp(),
         config.discount,
       )
-    with self._autocast():
-      q = networks.critics(batch.inputs, batch.action)
+    q = networks.critics(batch.inputs.to(self._dtype), batch.action)
     mask = None
     if batch.owner is not None:  # an example serves its own task alone
       tasks = torch.arange(len(reward), device=self._device)[:, None]
@@ -211,7 +219,8 @@ class LfgpLearner:
   ) -> tuple[torch.Tensor, Metrics]:
     """Returns the new actions' log densities [K, B], and metrics."""
     networks, config = self.networks, self._config
-    with frozen(self._critic_parameters), self._autocast():
+    inputs = inputs.to(self._dtype)
+    with frozen(self._critic_parameters):
       critic_features = networks.critics.trunk(inputs)
       features = critic_features
       if networks.intentions.owns_trunk:
@@ -238,8 +247,7 @@ class LfgpLearner:
   ) -> tuple[torch.Tensor, Metrics]:
     """The BC term: every task weighs bc_weight, times its mean |Q| if asked."""
     config = self._config
-    with self._autocast():
-      mean, _ = self.networks.intentions(expert.inputs)
+    mean, _ = self.networks.intentions(expert.inputs.to(self._dtype))
     weight = torch.full_like(
       q[0, :, 0], config.bc_weight * config.bc_decay**self.updates
     )
@@ -275,11 +283,6 @@ class LfgpLearner:
   def _noise(self, like: torch.Tensor) -> torch.Tensor:
     return torch.randn(
       like.shape, generator=self._generator, device=self._device
-    )
-
-  def _autocast(self) -> torch.autocast:
-    return torch.autocast(
-      self._device.type, torch.bfloat16, enabled=self._config.bfloat16
     )
 
   def adopt_intention_trunk(self) -> None:

@@ -2,8 +2,8 @@
 
 import torch
 from torch import nn
-from torch.nn import functional
 
+from agents.networks.discriminator_passes import DiscriminatorPasses
 from agents.networks.linear import make_linear
 
 INPUTS = ("state_action", "state")
@@ -53,27 +53,22 @@ class Discriminator(nn.Module):
     hidden = torch.tanh(self.first(pairs))
     return self.output(torch.tanh(self.second(hidden))).float()
 
-  def input_gradient(
-    self, pairs: torch.Tensor, per_task: bool = False
-  ) -> torch.Tensor:
-    """The logits' derivative by the input, itself differentiable.
-
-    Written out by hand, so that its own derivative by the weights is plain
-    backpropagation.
+  def logits_and_gradient(
+    self, pairs: torch.Tensor, mixed: torch.Tensor, per_task: bool = False
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """What both losses need, in one pass; differentiable by the weights alone.
 
     Args:
-      pairs: [K, N, I], the rows of each task.
-      per_task: False: of the sum of all K logits (released code). True: of
-        task k's logit for rows [k].
+      pairs: [R, I], see `join`; products are computed in their dtype.
+      mixed: [K, N, I], of the same dtype, the rows of each task.
+      per_task: False: the gradient of the sum of all K logits (released code).
+        True: of task k's logit for rows [k].
 
     Returns:
-      float32 [K, N, I].
+      The logits of `pairs`, float32 [R, K], and the derivative of logits of
+      `mixed` by their input, float32 [K, N, I].
     """
-    first = torch.tanh(self.first(pairs))
-    second = torch.tanh(self.second(first))
-    weight = self.output.weight  # [K, H]
-    weight = weight[:, None] if per_task else weight.sum(0)
-    gradient = (1 - second * second) * weight
-    gradient = functional.linear(gradient, self.second.weight.t())
-    gradient = gradient * (1 - first * first)
-    return functional.linear(gradient, self.first.weight.t()).float()
+    logits, gradient = DiscriminatorPasses.apply(
+      pairs, mixed.flatten(0, 1), per_task, *self.parameters()
+    )
+    return logits, gradient.view(mixed.shape)

@@ -50,18 +50,18 @@ class IntentionHeads(nn.Module):
     Returns:
       Mean and standard deviation, float32 [K, B, A] each.
     """
-    hidden = torch.relu(self.hidden(features))
+    hidden = self.hidden(features).relu_()
     if self.second is not None:
-      hidden = torch.relu(self.second(hidden))
+      hidden = self.second(hidden).relu_()
     return split(self.output(hidden))
 
   def one(
     self, features: torch.Tensor, task: int
   ) -> tuple[torch.Tensor, torch.Tensor]:
     """One task's Gaussian for features [B, H]: mean, raw deviation [B, A]."""
-    hidden = torch.relu(self.hidden.one(features, task))
+    hidden = self.hidden.one(features, task).relu_()
     if self.second is not None:
-      hidden = torch.relu(self.second.one(hidden, task))
+      hidden = self.second.one(hidden, task).relu_()
     mean, raw = self.output.one(hidden, task).chunk(2, dim=-1)
     return mean, raw
 

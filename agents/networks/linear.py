@@ -4,6 +4,7 @@ import math
 
 import torch
 from torch import nn
+from torch.nn import functional
 
 
 def initialise_(
@@ -24,11 +25,25 @@ def initialise_(
     return parameter.uniform_(-bound, bound, generator=generator)
 
 
+class Linear(nn.Linear):
+  """A `torch.nn.Linear` that computes in its inputs' dtype.
+
+  Parameters stay float32; bfloat16 inputs make the product one of bfloat16.
+  """
+
+  def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+    """Maps [..., inputs] to [..., outputs]."""
+    dtype = inputs.dtype
+    return functional.linear(
+      inputs, self.weight.to(dtype), self.bias.to(dtype)
+    )
+
+
 def make_linear(
   inputs: int, outputs: int, generator: torch.Generator
-) -> nn.Linear:
-  """A `torch.nn.Linear` with its default bounds, drawn from `generator`."""
-  layer: nn.Linear = nn.utils.skip_init(nn.Linear, inputs, outputs)
+) -> Linear:
+  """A `Linear` with torch's default bounds, drawn from `generator`."""
+  layer: Linear = nn.utils.skip_init(Linear, inputs, outputs)
   initialise_(layer.weight, inputs, generator)
   initialise_(layer.bias, inputs, generator)
   return layer
@@ -61,15 +76,19 @@ class StackedLinear(nn.Module):
       inputs: [G, B, I], or [B, I] for the same rows in every group.
 
     Returns:
-      [G, B, outputs].
+      [G, B, outputs], computed in the inputs' dtype.
     """
     if self.weight.shape[0] == 1:  # a plain product is faster than a batched
       rows = inputs.reshape(-1, inputs.shape[-1])
       return self.one(rows, 0)[None]
     if inputs.dim() == 2:
       inputs = inputs.expand(self.weight.shape[0], *inputs.shape)
-    return torch.baddbmm(self.bias, inputs, self.weight)
+    dtype = inputs.dtype
+    return torch.baddbmm(self.bias.to(dtype), inputs, self.weight.to(dtype))
 
   def one(self, inputs: torch.Tensor, group: int) -> torch.Tensor:
     """Applies layer `group` alone to [B, I]; returns [B, outputs]."""
-    return torch.addmm(self.bias[group], inputs, self.weight[group])
+    dtype = inputs.dtype
+    return torch.addmm(
+      self.bias[group].to(dtype), inputs, self.weight[group].to(dtype)
+    )

@@ -73,4 +73,4 @@ class Trunk(nn.Module):
 
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
     """Maps inputs [..., O] to features [..., H]."""
-    return torch.relu(self.second(torch.relu(self.first(inputs))))
+    return self.second(self.first(inputs).relu_()).relu_()

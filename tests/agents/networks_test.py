@@ -123,20 +123,30 @@ class DiscriminatorTest(parameterized.TestCase):
   @parameterized.product(
     inputs=("state_action", "state"), per_task=(False, True)
   )
-  def test_hand_written_derivative_equals_autograd(self, inputs, per_task):
-    network = Discriminator(K, OBS, A, H, _generator(), inputs).double()
+  def test_hand_written_passes_equal_autograd(self, inputs, per_task):
+    network = Discriminator(K, OBS, A, H, _generator(), inputs)
     size = OBS + (A if inputs == "state_action" else 0)
-    pairs = torch.randn(
-      K, B, size, dtype=torch.float64, generator=_generator()
-    ).requires_grad_()
-    # The logits themselves are float32; take them in float64 here.
-    hidden = torch.tanh(network.second(torch.tanh(network.first(pairs))))
-    logits = network.output(hidden)
-    if per_task:
-      logits = logits.diagonal(dim1=0, dim2=2)
-    (expected,) = torch.autograd.grad(logits.sum(), pairs)
+    pairs = torch.randn(5 * B, size, generator=_generator())
+    mixed = torch.randn(K, B, size, generator=_generator())
+
+    def plain():
+      rows = mixed.clone().requires_grad_()
+      logits = network(rows)
+      if per_task:
+        logits = logits.diagonal(dim1=0, dim2=2)
+      (gradient,) = torch.autograd.grad(logits.sum(), rows, create_graph=True)
+      return network(pairs), gradient
+
+    def gradients(logits, gradient):
+      loss = logits.square().mean() + (gradient.norm(dim=-1) - 1).square().sum()
+      return torch.autograd.grad(loss, list(network.parameters()))
+
+    expected = plain()
+    found = network.logits_and_gradient(pairs, mixed, per_task)
+    torch.testing.assert_close(found, expected)
+    # The last bias does not move the input gradient, but the logits.
     torch.testing.assert_close(
-      network.input_gradient(pairs, per_task), expected.float()
+      gradients(*found), gradients(*expected), rtol=1e-4, atol=1e-5
     )
 
   def test_state_input_ignores_the_action(self):
