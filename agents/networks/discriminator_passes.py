@@ -19,10 +19,17 @@ _ALIGNED = 16  # products with a row length off this waste up to half their time
 
 
 def tanh_(value: torch.Tensor) -> torch.Tensor:
-  """tanh in place, as 2 sigmoid(2 x) - 1: a fifth of tanh's time on a CPU."""
-  if value.dtype != torch.float32:  # would lose digits around 0
-    return value.tanh_()
-  return value.mul_(2).sigmoid_().mul_(2).sub_(1)
+  """tanh as 2 sigmoid(2 x) - 1: a fifth of tanh's time on a CPU.
+
+  Args:
+    value: any shape; a float32 tensor is overwritten.
+
+  Returns:
+    The same shape and dtype; computed in float32, which keeps the digits that
+    the difference would cost bfloat16.
+  """
+  wide = value if value.dtype == torch.float32 else value.float()
+  return wide.mul_(2).sigmoid_().mul_(2).sub_(1).to(value.dtype)
 
 
 class DiscriminatorPasses(torch.autograd.Function):
