@@ -10,9 +10,10 @@ This facade is the one file of the core that reaches `tasks` and `agents`, and
 only inside its functions: importing it loads neither a simulator nor torch.
 """
 
+import functools
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import dm_env
 import numpy as np
@@ -32,6 +33,9 @@ from lfgp_dmc.task_names import (
   task_set,
 )
 
+if TYPE_CHECKING:
+  from lfgp_dmc.vector import VectorEnvironment
+
 __all__ = [
   "ALL_TASKS",
   "AUXILIARY_TASKS",
@@ -42,6 +46,7 @@ __all__ = [
   "flatten",
   "load",
   "load_policy",
+  "load_vector",
   "successes",
   "task_set",
 ]
@@ -69,6 +74,36 @@ def load(
   import tasks
 
   return tasks.load(task, seed=seed, **options)
+
+
+def load_vector(
+  task: str, count: int, seed: int = 0, **options: Any
+) -> "VectorEnvironment":
+  """Builds environments side by side, each in a process of its own.
+
+  Args:
+    task: a name in `ALL_TASKS`.
+    count: W, how many.
+    seed: environment i goes through the states of `load(task, seed + i)`.
+    **options: as for `load`.
+
+  Returns:
+    A `VectorEnvironment`; see `lfgp_dmc/vector.py`. `close` it, or use it in a
+    `with` statement. A script that does so needs the usual
+    `if __name__ == "__main__":` of multiprocessing.
+
+  Raises:
+    ValueError: a count below 1.
+    RuntimeError: an environment could not be built; its process tells why.
+  """
+  from lfgp_dmc.vector import VectorEnvironment
+
+  return VectorEnvironment(
+    [
+      functools.partial(load, task, seed + index, **options)
+      for index in range(count)
+    ]
+  )
 
 
 def load_policy(

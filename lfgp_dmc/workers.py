@@ -51,7 +51,7 @@ def ordered(
         state.close()
     return
   jobs = iter(jobs)
-  with _variables():
+  with variables():
     pool = concurrent.futures.ProcessPoolExecutor(
       workers,
       mp_context=multiprocessing.get_context("spawn"),
@@ -77,8 +77,8 @@ _state: Callable[[Any], Any] | None = None  # one in each worker process
 
 def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
   global _state
-  signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides
-  threading.Thread(target=_end_with_parent, daemon=True).start()
+  ignore_interrupts()
+  threading.Thread(target=end_with_parent, daemon=True).start()
   _state = make_state()
 
 
@@ -87,8 +87,13 @@ def _work(job: Any) -> Any:
   return _state(job)
 
 
-def _end_with_parent() -> None:
-  """Ends this worker when its parent is gone, however that was killed."""
+def ignore_interrupts() -> None:
+  """Leaves Ctrl-C, which goes to every process, to the parent."""
+  signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def end_with_parent() -> None:
+  """Ends this process when its parent is gone, however that was killed."""
   parent = multiprocessing.parent_process()
   assert parent is not None
   parent.join()
@@ -96,7 +101,7 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def _variables() -> Iterator[None]:
+def variables() -> Iterator[None]:
   """Sets the variables that spawned processes inherit, then restores ours.
 
   They must be there before a worker's first import, which an initializer
