@@ -2,7 +2,8 @@
 
 python launch/benchmark.py --what=environment
 python launch/benchmark.py --what=learner --preset=fast
-python launch/benchmark.py --what=training --config.threads=2
+python launch/benchmark.py --what=training --config.actor_process
+python launch/benchmark.py --what=memory --steps=20000
 python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
 
@@ -20,17 +21,18 @@ from lfgp_dmc import files
 _WHAT = flags.DEFINE_enum(
   "what",
   "environment",
-  ["environment", "learner", "training", "stability"],
+  ["environment", "learner", "training", "memory", "stability"],
   "environment: control steps a second through dm_env, the physics' alone, "
-  "and a reset's time. learner: updates a second, against matrix products. "
-  "training: steps a second of the whole loop. stability: random steps that "
+  "a reset's time, and environments side by side. learner: updates a second, "
+  "against matrix products. training: steps a second of the whole loop, against "
+  "the learner alone. memory: with a full replay on disk. stability: random steps that "
   "count NaN, MuJoCo's warnings and lost blocks.",
 )
 _STEPS = flags.DEFINE_integer(
   "steps",
   0,
   "Control steps; default: 7200 (environment), 1000 (training), 200000 a task "
-  "(stability).",
+  "(stability); of memory: updates, default 20000.",
   lower_bound=0,
 )
 _TASKS = flags.DEFINE_list(
@@ -42,7 +44,12 @@ _SECONDS = flags.DEFINE_float(
 )
 _OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
 
-_DEFAULT_STEPS = {"environment": 7_200, "training": 1_000, "stability": 200_000}
+_DEFAULT_STEPS = {
+  "environment": 7_200,
+  "training": 1_000,
+  "memory": 20_000,
+  "stability": 200_000,
+}
 
 
 def main() -> None:
@@ -86,6 +93,10 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
       from launch.benchmarks import training
 
       yield from training.measure(config, steps, _SECONDS.value)
+    case "memory":
+      from launch.benchmarks import memory
+
+      yield from memory.measure(config, steps)
     case "stability":
       from launch.benchmarks import stability
 

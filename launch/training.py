@@ -25,6 +25,7 @@ from lfgp_dmc import (
 )
 from lfgp_dmc.demonstrations import Demonstrations
 from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.replay import Replay
 from lfgp_dmc.run_folder import RunFolder
 
@@ -198,6 +199,7 @@ class _Run:
     self._progress_bar = progress_bar
     self._save_policy(self._progress.env_step)
     schedule = _schedule(self._config, progress_bar)
+    remote = None
     try:
       if self._replay is None:
         return supervised.train(
@@ -208,6 +210,8 @@ class _Run:
           self._checkpoint,
           progress=self._progress,
         )
+      if self._config.actor_process:
+        remote = self._make_remote_actor()
       return loop.train(
         self._environment,
         self._agent,
@@ -218,10 +222,23 @@ class _Run:
         self._checkpoint,
         seed=seeding.derive(self._config.seed, "environment"),
         progress=self._progress,
+        remote=remote,
       )
     finally:
+      if remote is not None:
+        remote.close()
       self._log.close()
       self._environment.close()
+
+  def _make_remote_actor(self) -> RemoteActor:
+    config = self._config
+    return RemoteActor(
+      functools.partial(
+        worlds.build, config.environment, config.main_task, config.keeps_rewards
+      ),
+      functools.partial(actors.sampling_policy, self._agent.policy_options()),
+      self._replay.reward_tasks,
+    )
 
   def _evaluate(self, env_step: int) -> dict[str, float]:
     self._save_policy(env_step)

@@ -8,7 +8,7 @@ replay and neither the scheduler nor the episode count sees it.
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import dm_env
 import numpy as np
@@ -17,9 +17,10 @@ from absl import logging
 
 from lfgp_dmc import environments, seeding
 from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.replay import Replay
 from lfgp_dmc.signals import StopRequest, stop_request
-from lfgp_dmc.types import Agent, Episode, Transition
+from lfgp_dmc.types import Agent, Episode, Step, Transition
 
 
 @dataclasses.dataclass(frozen=True)
@@ -76,6 +77,7 @@ def train(
   *,
   seed: int = 0,
   progress: Progress | None = None,
+  remote: RemoteActor | None = None,
 ) -> Progress:
   """Trains until `schedule.env_steps`, or until SIGINT or SIGTERM.
 
@@ -94,11 +96,15 @@ def train(
     checkpoint_fn: stores agent, replay and the progress it is given.
     seed: of the episodes' starts and the random actions.
     progress: of the checkpoint that is being resumed.
+    remote: plays the episodes while this process learns; it has a world of its
+      own. None: they are played here, in turns with the updates.
 
   Returns:
     The progress; `is_complete` tells whether it was stopped.
   """
-  loop = _Loop(environment, agent, replay, schedule, log, seed, progress)
+  loop = _Loop(
+    environment, agent, replay, schedule, log, seed, progress, remote
+  )
   with stop_request() as stop:
     loop.run(stop, evaluate_fn, checkpoint_fn)
   return loop.progress
@@ -107,8 +113,11 @@ def train(
 class _Loop:
   """The state of one call of `train`."""
 
-  def __init__(self, environment, agent, replay, schedule, log, seed, progress):
+  def __init__(
+    self, environment, agent, replay, schedule, log, seed, progress, remote
+  ):
     self.progress: Progress = progress or Progress()
+    self._remote: RemoteActor | None = remote
     self._environment: dm_env.Environment = environment
     self._agent: Agent = agent
     self._replay: Replay = replay
@@ -163,6 +172,33 @@ class _Loop:
     """Plays to the episode's end, or to the last step of the run."""
     progress, schedule = self.progress, self._schedule
     number = progress.episodes + progress.physics_failures
+    steps = self._here(number)
+    if self._remote is not None:
+      steps = self._remote.episode(
+        self._agent,
+        seeding.derive(self._seed, "training episode", number),
+        progress.env_step,
+        schedule.env_steps - progress.env_step,
+      )
+    rows: list[Step] = []
+    for step in steps:
+      progress.env_step += 1
+      if step.is_physics_failure:
+        self._drop_episode(len(rows))
+      else:
+        self._replay.add(step.transition, step.rewards)
+        rows.append(step)
+        self._update()
+      self._bar.update()
+      if progress.env_step % schedule.log_every == 0:
+        self._write_row()
+    if step.is_last and not step.is_physics_failure:
+      progress.episodes += 1
+      self._agent.end_episode(_episode(rows))
+
+  def _here(self, number: int) -> Iterator[Step]:
+    """Plays an episode in this process; each step knows of all updates."""
+    progress, schedule = self.progress, self._schedule
     if hasattr(self._environment, "reseed"):
       self._environment.reseed(
         seeding.derive(self._seed, "training episode", number)
@@ -171,28 +207,19 @@ class _Loop:
     timestep = self._environment.reset()
     self._agent.begin_episode()
     observation = self._flatten(timestep.observation)
-    rows: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]] = []
     while not timestep.last() and progress.env_step < schedule.env_steps:
       action = self._agent.act(observation)  # also steps the scheduler
       if progress.env_step < schedule.random_steps:
         action = random.uniform(-1, 1, action.shape).astype(np.float32)
       timestep = self._environment.step(action)
-      progress.env_step += 1
-      if environments.is_physics_failure(timestep):
-        self._drop_episode(len(rows))
-      else:
-        reached = self._flatten(timestep.observation)
-        rewards = self._rewards(timestep)
-        self._replay.add(Transition(observation, action, reached), rewards)
-        rows.append((observation, action, rewards))
-        observation = reached
-        self._update()
-      self._bar.update()
-      if progress.env_step % schedule.log_every == 0:
-        self._write_row()
-    if timestep.last() and not environments.is_physics_failure(timestep):
-      progress.episodes += 1
-      self._agent.end_episode(_episode(rows))
+      reached = self._flatten(timestep.observation)
+      yield Step(
+        Transition(observation, action, reached),
+        self._rewards(timestep),
+        timestep.last(),
+        environments.is_physics_failure(timestep),
+      )
+      observation = reached
 
   def _rewards(self, timestep: dm_env.TimeStep) -> np.ndarray | None:
     tasks = self._replay.reward_tasks
@@ -255,9 +282,9 @@ def passed(before: int, now: int, every: int) -> bool:
   return before // every != now // every
 
 
-def _episode(
-  rows: list[tuple[np.ndarray, np.ndarray, np.ndarray | None]],
-) -> Episode:
-  observations, actions, rewards = zip(*rows, strict=True)
-  kept = None if rewards[0] is None else np.stack(rewards)
+def _episode(steps: Sequence[Step]) -> Episode:
+  observations, actions, _ = zip(*(s.transition for s in steps), strict=True)
+  kept = None
+  if steps[0].rewards is not None:
+    kept = np.stack([step.rewards for step in steps])
   return Episode(np.stack(observations), np.stack(actions), kept)

@@ -27,6 +27,23 @@ class Transition(NamedTuple):
   next_observation: np.ndarray  # float32 [O]
 
 
+class Step(NamedTuple):
+  """One step of an episode as the training loop gets it."""
+
+  transition: Transition
+  rewards: np.ndarray | None  # float32 [R] if the replay keeps them
+  is_last: bool
+  is_physics_failure: bool
+
+
+class Period(NamedTuple):
+  """What a scheduler chose: some steps of one intention."""
+
+  task: str
+  steps: int
+  random_steps: int  # the first so many take actions from U[-1, 1]
+
+
 class Actor(Protocol):
   """Plays one task at a time: a scripted expert or a learned intention."""
 
@@ -50,6 +67,13 @@ class Agent(Protocol):
 
   def act(self, observation: np.ndarray) -> np.ndarray:
     """Chooses the exploring action, float32 [A]; steps the scheduler."""
+
+  def next_period(self, env_step: int) -> Period:
+    """Steps the scheduler for an actor elsewhere; in place of `act`.
+
+    Args:
+      env_step: steps of the run before the period.
+    """
 
   def end_episode(self, episode: "Episode") -> None:
     """Called once the episode is complete (the scheduler learns here)."""

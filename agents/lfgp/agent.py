@@ -21,7 +21,7 @@ from agents.metering import Meter
 from agents.policy import Policy
 from agents.schedulers import Scheduler, period_returns
 from lfgp_dmc import seeding
-from lfgp_dmc.types import Episode, Metrics
+from lfgp_dmc.types import Episode, Metrics, Period
 
 _CLONING_LOG_EVERY = 1000  # warm-start updates between readings of its loss
 
@@ -53,14 +53,14 @@ class LfgpAgent:
     self.tasks = tuple(tasks)
     self.policy = Policy(learner.networks.intentions, tasks)
     self._config = config
-    self._learner = learner
+    self.learner = learner
     self._scheduler = scheduler
     self._experts = experts
     device = learner.networks.log_temperature.device
     self._standardise = learner.networks.intentions.standardiser
     self._acting = seeding.generator(seed, "acting")
     self._sampling = seeding.generator(seed, "sampling")
-    self._batches = BatchMaker(
+    self.batches = BatchMaker(
       config,
       tasks,
       replay,
@@ -83,7 +83,7 @@ class LfgpAgent:
   @property
   def updates(self) -> int:
     """Updates made so far, warm start not counted."""
-    return self._learner.updates
+    return self.learner.updates
 
   @property
   def task(self) -> str:
@@ -102,14 +102,14 @@ class LfgpAgent:
     """
     self._check_common(policy.tasks, "the policy")
     carrying.carry_heads(
-      self._learner.networks.intentions,
+      self.learner.networks.intentions,
       policy.arrays(),
       self.tasks,
       policy.tasks,
       "the policy",
     )
     self._refresh_inputs()
-    self._learner.adopt_intention_trunk()
+    self.learner.adopt_intention_trunk()
 
   def carry_over(
     self,
@@ -129,7 +129,7 @@ class LfgpAgent:
       ValueError: its networks have other sizes, or none of our tasks.
     """
     self._check_common(source_tasks, "the other run")
-    own = self._learner.networks
+    own = self.learner.networks
     carrying.carry_networks(own, networks, self.tasks, source_tasks)
     self._refresh_inputs()
     if set(self.tasks) - set(source_tasks):
@@ -169,9 +169,7 @@ class LfgpAgent:
       float32 [A]; from U[-1, 1] during the first `random_steps` steps.
     """
     if self._episode_step % self._config.xi == 0:
-      index = self._scheduler.next_task()
-      self._choices[index] += 1
-      self._task = self.tasks[index]
+      self._choose()
     self._episode_step += 1
     self._env_steps += 1
     if self._env_steps <= self._config.random_steps:
@@ -180,6 +178,18 @@ class LfgpAgent:
     return self.policy.act(
       observation, self._task, deterministic=False, generator=self._acting
     )
+
+  def next_period(self, env_step: int) -> Period:
+    """Steps the scheduler for an actor elsewhere; see `types.Agent`."""
+    self._choose()
+    self._env_steps = env_step
+    random_steps = max(0, self._config.random_steps - env_step)
+    return Period(self._task, self._config.xi, random_steps)
+
+  def _choose(self) -> None:
+    index = self._scheduler.next_task()
+    self._choices[index] += 1
+    self._task = self.tasks[index]
 
   def end_episode(self, episode: Episode) -> None:
     """Lets the scheduler learn from the main task's reward.
@@ -195,8 +205,8 @@ class LfgpAgent:
 
   def update(self) -> None:
     """Makes one update of all networks."""
-    draw = self._batches.draw(self._learner.updates)
-    self._meter.add(self._learner.update(*draw))
+    draw = self.batches.draw(self.learner.updates)
+    self._meter.add(self.learner.update(*draw))
 
   def metrics(self) -> Metrics:
     """Means since the last call; NaN for what has not happened since."""
@@ -223,7 +233,7 @@ class LfgpAgent:
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values; taken between episodes."""
     return {
-      "learner": self._learner.state_dict(),
+      "learner": self.learner.state_dict(),
       "scheduler": self._scheduler.state_dict(),
       "meter": self._meter.state_dict(),
       "choices": self._choices.copy(),
@@ -235,7 +245,7 @@ class LfgpAgent:
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
-    self._learner.load_state_dict(state["learner"])
+    self.learner.load_state_dict(state["learner"])
     self._scheduler.load_state_dict(state["scheduler"])
     self._meter.load_state_dict(state["meter"])
     self._choices[:] = state["choices"]
@@ -254,9 +264,9 @@ class LfgpAgent:
         return episode.rewards[:, self._main_reward]
       case "examples":
         return np.full(len(episode.action), -self._config.reward_scale)
-    put = self._batches.put
+    put = self.batches.put
     inputs = self._standardise(put(episode.observation))
-    return self._learner.rewards(inputs, put(episode.action))[0].cpu().numpy()
+    return self.learner.rewards(inputs, put(episode.action))[0].cpu().numpy()
 
   def _check_common(self, source_tasks: Sequence[str], what: str) -> None:
     if not set(self.tasks) & set(source_tasks):
@@ -272,7 +282,7 @@ class LfgpAgent:
 
   def _warm_start(self, progress_bar: bool) -> None:
     """Pure behaviour cloning; then the critics start from its trunk."""
-    config, intentions = self._config, self._learner.networks.intentions
+    config, intentions = self._config, self.learner.networks.intentions
     assert self._experts is not None, "a warm start needs demonstrations"
     intentions.owns_trunk = True  # cloning trains it, whosever it is later
     cloner = IntentionCloner(
@@ -297,4 +307,4 @@ class LfgpAgent:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")
     intentions.owns_trunk = config.owns_trunk
-    self._learner.adopt_intention_trunk()
+    self.learner.adopt_intention_trunk()

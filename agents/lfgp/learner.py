@@ -116,8 +116,8 @@ class LfgpLearner:
     trunk = self.networks.intentions.trunk
     is_frozen = self.updates < self._config.freeze_updates
     with frozen(list(trunk.parameters()) if is_frozen else []):
-      metrics |= self._update_critics(batch, self._rewards_of(batch))
-      log_prob, policy_metrics = self._update_intentions(inputs, expert)
+      metrics |= self.update_critics(batch, self._rewards_of(batch))
+      log_prob, policy_metrics = self.update_intentions(inputs, expert)
     metrics |= policy_metrics
     metrics |= self._update_temperatures(log_prob)
     polyak(
@@ -170,7 +170,8 @@ class LfgpLearner:
     own = action[batch.owner[at], torch.arange(len(at), device=self._device)]
     return batch._replace(action=batch.action.index_copy(0, at, own))
 
-  def _update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
+  def update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
+    """One update of trunk and critics; reward [K, B]."""
     networks, config = self.networks, self._config
     with torch.no_grad():
       next_inputs = batch.next_inputs.to(self._dtype)
@@ -214,7 +215,7 @@ class LfgpLearner:
     scale = self._config.reward_scale
     return self._bounds.of_examples(q, batch.owner == tasks, scale)
 
-  def _update_intentions(
+  def update_intentions(
     self, inputs: torch.Tensor, expert: ExpertBatch | None
   ) -> tuple[torch.Tensor, Metrics]:
     """Returns the new actions' log densities [K, B], and metrics."""

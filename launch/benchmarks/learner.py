@@ -1,22 +1,26 @@
 """Speed of updates, against what the machine's matrix products reach."""
 
+import contextlib
 import dataclasses
-import functools
+import statistics
 import time
 from collections.abc import Callable, Iterator
+from unittest import mock
 
 import numpy as np
 import torch
-from torch.utils import flop_counter
 
 from agents import synthetic
+from launch.benchmarks.operations import gflop_of_update
 from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import observations, task_names
 
 _ACTION_SIZE = 4
 _PAIRS = 2_000  # a task
 _ROWS = 20_000  # of the replay
-_SIDE = 1_024  # of the square matrices
+_PRODUCTS = (12, 256, 256)  # the shape of both factors: the critics' own
+_BEST_OF = 20
+_ROUNDS = 5  # of updates and products in turns: a shared host's speed wanders
 _DTYPES = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 
@@ -28,26 +32,56 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     seconds: about how long each measurement takes.
 
   Yields:
-    `updates_per_s_fp32_1thread` and so on; `matmul_gflops_...`;
-    `gflop_per_update` (matrix products that are executed, 2 per multiply-add);
-    `roofline_fraction_...`: the first times the third over the second.
+    `gflop/<term>` and their sum `gflop_per_update` (see `operations.py`);
+    `updates_per_s_fp32_1thread` and so on, medians over rounds;
+    `matmul_gflops_...`; `roofline_fraction_...`: the first times the second
+    over the third, median of the rounds' own; `share_<part>_...`: of the time.
   """
-  agents = {
-    dtype: make_agent(config, bfloat16=dtype == "bf16") for dtype in _DTYPES
-  }
-  operations = _operations(agents["fp32"].update)
+  tasks = tasks_of(config)
+  terms = gflop_of_update(
+    config.agent, len(tasks), observations.OBSERVATION_SIZE, _ACTION_SIZE
+  )
+  for name, value in terms.items():
+    yield f"gflop/{name}", value
+  operations = 1e9 * sum(terms.values())
   yield "gflop_per_update", operations / 1e9
   for threads in (1, 2):
     torch.set_num_threads(threads)
     for name, dtype in _DTYPES.items():
       suffix = f"{name}_{threads}thread{'s' if threads > 1 else ''}"
-      updates = rate(agents[name].update, seconds)
-      matrix = torch.randn(_SIDE, _SIDE).to(dtype)
-      products = rate(functools.partial(torch.mm, matrix, matrix), seconds / 4)
-      peak = products * 2 * _SIDE**3
-      yield f"updates_per_s_{suffix}", updates
-      yield f"matmul_gflops_{suffix}", peak / 1e9
-      yield f"roofline_fraction_{suffix}", updates * operations / peak
+      agent = make_agent(config, bfloat16=name == "bf16")
+      rounds = [
+        (rate(agent.update, seconds / _ROUNDS), best_matmul_rate(dtype))
+        for _ in range(_ROUNDS)
+      ]
+      rates, peaks = zip(*rounds, strict=True)
+      yield f"updates_per_s_{suffix}", statistics.median(rates)
+      yield f"matmul_gflops_{suffix}", statistics.median(peaks) / 1e9
+      yield (
+        f"roofline_fraction_{suffix}",
+        statistics.median(r * operations / p for r, p in rounds),
+      )
+      for part, share in time_shares(agent, seconds / _ROUNDS).items():
+        yield f"share_{part}_{suffix}", share
+
+
+def best_matmul_rate(dtype: torch.dtype) -> float:
+  """Operations a second of batched products as large as the critics'."""
+  left, right = (torch.randn(_PRODUCTS).to(dtype) for _ in range(2))
+  out, best = torch.empty(_PRODUCTS, dtype=dtype), float("inf")
+  for _ in range(_BEST_OF):
+    start = time.perf_counter()
+    torch.bmm(left, right, out=out)
+    best = min(best, time.perf_counter() - start)
+  groups, rows, inner = _PRODUCTS
+  return 2 * groups * rows * inner * inner / best
+
+
+def tasks_of(config: RunConfig) -> tuple[str, ...]:
+  """What the config's algorithm learns: all of `task_set`, or the main task."""
+  if ALGORITHMS[config.algorithm].is_multitask:
+    return task_names.task_set(config.main_task)
+  return (config.main_task,)
 
 
 def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
@@ -61,7 +95,7 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
   changes = {"bc_warm_start_updates": 0}
   if bfloat16 is not None:
     changes["bfloat16"] = bfloat16
-  tasks = task_names.task_set(config.main_task)
+  tasks = tasks_of(config)
   size = observations.OBSERVATION_SIZE
   if replay is None:
     rows = synthetic.transitions(_ROWS, size, _ACTION_SIZE)
@@ -79,6 +113,36 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
   )
 
 
+def time_shares(agent, seconds: float) -> dict[str, float]:
+  """How an update's time is divided: part -> share; `rest` is all else."""
+  spent: dict[str, float] = {}
+  parts = {
+    "sampling": (agent.batches, "draw"),
+    "discriminator": (agent.learner, "update_discriminator"),
+    "critics": (agent.learner, "update_critics"),
+    "intentions": (agent.learner, "update_intentions"),
+  }
+
+  def timed(part: str, call: Callable) -> Callable:
+    def wrapped(*arguments):
+      start = time.perf_counter()
+      result = call(*arguments)
+      spent[part] = spent.get(part, 0.0) + time.perf_counter() - start
+      return result
+
+    return wrapped
+
+  with contextlib.ExitStack() as stack:
+    for part, (owner, name) in parts.items():
+      patched = timed(part, getattr(owner, name))
+      stack.enter_context(mock.patch.object(owner, name, patched))
+    start = time.perf_counter()
+    rate(agent.update, seconds)
+    total = time.perf_counter() - start
+  spent["rest"] = total - sum(spent.values())
+  return {part: value / total for part, value in spent.items()}
+
+
 def rate(call: Callable[[], object], seconds: float) -> float:
   """Calls a second, after three to warm up."""
   for _ in range(3):
@@ -88,9 +152,3 @@ def rate(call: Callable[[], object], seconds: float) -> float:
     call()
     count += 1
   return count / elapsed
-
-
-def _operations(update: Callable[[], object]) -> int:
-  with flop_counter.FlopCounterMode(display=False) as counter:
-    update()
-  return counter.get_total_flops()

@@ -1,5 +1,6 @@
-"""Speed of the whole loop: environment, replay, updates."""
+"""Speed of the whole loop, acting included, against the learner's alone."""
 
+import functools
 import tempfile
 import time
 from collections.abc import Iterator
@@ -7,10 +8,12 @@ from collections.abc import Iterator
 import torch
 
 import lfgp_dmc
+from launch import actors
 from launch.benchmarks import learner
 from launch.configs import RunConfig
 from lfgp_dmc import loop, observations
 from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.replay import Replay
 
 _ACTION_SIZE = 4
@@ -23,38 +26,75 @@ def measure(
   """Trains for `steps` steps after one episode without updates.
 
   Args:
-    config: of the run; demonstrations are made up.
+    config: of the run; demonstrations are made up. Its `threads` are not used:
+      the loop gets the number of threads with which the learner is faster.
     steps: environment steps with updates.
-    seconds: about how long the updates alone are measured.
+    seconds: about how long the updates alone are measured, each time.
 
   Yields:
-    `loop_steps_per_s`: of the whole loop; `learner_updates_per_s`: of updates
-    alone, on the same replay.
+    `learner_updates_per_s_1thread`, `..._2threads`: of updates alone, before
+    the loop; `loop_threads`; `loop_steps_per_s` and `loop_updates_per_s`: of
+    the whole loop; `learner_updates_per_s`: of updates alone once more, after
+    it; `loop_fraction`: the loop's updates a second over the faster of these.
   """
-  torch.set_num_threads(config.threads or torch.get_num_threads())
-  environment = lfgp_dmc.load(config.main_task, seed=config.seed)
   replay = Replay(steps + _EPISODE, observations.OBSERVATION_SIZE, _ACTION_SIZE)
   agent = learner.make_agent(config, replay)
-
-  def train(env_steps: int, progress: loop.Progress | None) -> loop.Progress:
-    schedule = loop.TrainSchedule(
-      env_steps=env_steps,
-      log_every=config.log_every,
-      warmup_steps=_EPISODE,
-      updates_per_step=config.agent.updates_per_step,
-      progress_bar=False,
-    )
-    with tempfile.TemporaryDirectory() as folder:
-      log = MetricsLog(folder)
-      progress = loop.train(
-        environment, agent, replay, schedule, log, progress=progress
-      )
-      log.close()
-    return progress
-
+  environment = lfgp_dmc.load(config.main_task, seed=config.seed)
+  remote = _remote_actor(config, agent) if config.actor_process else None
+  train = functools.partial(_train, config, environment, agent, replay, remote)
   progress = train(_EPISODE, None)
+  rates = {}
+  for threads in (1, 2):
+    torch.set_num_threads(threads)
+    rates[threads] = learner.rate(agent.update, seconds)
+    yield f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}", rates[
+      threads
+    ]
+  threads = max(rates, key=rates.__getitem__)
+  torch.set_num_threads(threads)
+  yield "loop_threads", threads
+  before = progress.update
   start = time.perf_counter()
-  train(_EPISODE + steps, progress)
-  yield "loop_steps_per_s", steps / (time.perf_counter() - start)
-  yield "learner_updates_per_s", learner.rate(agent.update, seconds)
+  progress = train(_EPISODE + steps, progress)
+  elapsed = time.perf_counter() - start
+  yield "loop_steps_per_s", steps / elapsed
+  updates = (progress.update - before) / elapsed
+  yield "loop_updates_per_s", updates
+  again = learner.rate(agent.update, seconds)
+  yield "learner_updates_per_s", again
+  yield "loop_fraction", updates / max(again, rates[threads])
   environment.close()
+  if remote is not None:
+    remote.close()
+
+
+def _remote_actor(config: RunConfig, agent) -> RemoteActor:
+  return RemoteActor(
+    functools.partial(lfgp_dmc.load, config.main_task),
+    functools.partial(actors.sampling_policy, agent.policy_options()),
+  )
+
+
+def _train(
+  config, environment, agent, replay, remote, env_steps, progress
+) -> loop.Progress:
+  schedule = loop.TrainSchedule(
+    env_steps=env_steps,
+    log_every=config.log_every,
+    warmup_steps=_EPISODE + 1,
+    updates_per_step=config.agent.updates_per_step,
+    progress_bar=False,
+  )
+  with tempfile.TemporaryDirectory() as folder:
+    log = MetricsLog(folder)
+    progress = loop.train(
+      environment,
+      agent,
+      replay,
+      schedule,
+      log,
+      progress=progress,
+      remote=remote,
+    )
+    log.close()
+  return progress

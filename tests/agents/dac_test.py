@@ -40,7 +40,7 @@ def _shapes(module):
 
 class SeparateNetworksTest(parameterized.TestCase):
   def test_have_the_papers_layers(self):
-    networks = _build(hidden_size=256)._learner.networks
+    networks = _build(hidden_size=256).learner.networks
     self.assertEqual(
       _shapes(networks.intentions),  # 59-256-256-8
       {
@@ -68,7 +68,7 @@ class SeparateNetworksTest(parameterized.TestCase):
     self.assertEqual(first, (256, 63))
 
   def test_critics_equal_plain_networks(self):
-    heads = _build()._learner.networks.critics.heads
+    heads = _build().learner.networks.critics.heads
     inputs, action = torch.randn(5, OBS), torch.randn(5, A)
     for twin in range(2):
       weight = torch.cat(
@@ -83,7 +83,7 @@ class SeparateNetworksTest(parameterized.TestCase):
   @parameterized.parameters("shared", "own")
   def test_each_loss_trains_its_own_network_alone(self, actor_trunk):
     agent = _build(critic_learning_rate=1e-30, actor_trunk=actor_trunk)
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     before = {
       name: [p.detach().clone() for p in module.parameters()]
       for name, module in networks.modules().items()

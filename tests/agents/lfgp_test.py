@@ -96,7 +96,7 @@ class LearningTest(absltest.TestCase):
       agent.update()
     demonstrations = synthetic.demonstrations(TASKS, 200, OBS, A)
     other = synthetic.transitions(200, OBS, A, seed=9)
-    learner = agent._learner
+    learner = agent.learner
     for index, task in enumerate(TASKS):
       expert = learner.rewards(
         torch.from_numpy(demonstrations[task].observation),
@@ -116,7 +116,7 @@ class LearningTest(absltest.TestCase):
     agent.prepare()
     after = np.square(agent.policy.act(part.observation, "reach") - part.action)
     self.assertLess(after.mean(), 0.2 * before.mean())
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     for critics in (networks.critics, networks.target_critics):
       torch.testing.assert_close(
         critics.trunk.state_dict(),
@@ -168,7 +168,7 @@ class ContractTest(parameterized.TestCase):
       agent.act(row)
       chosen.append(TASKS.index(agent.task))
     agent.end_episode(Episode(rows.observation, rows.action))
-    reward = agent._learner.rewards(
+    reward = agent.learner.rewards(
       torch.from_numpy(rows.observation), torch.from_numpy(rows.action)
     )[0]
     expected = sum(reward[10 + t].item() * 0.5**t for t in range(10))
@@ -203,7 +203,7 @@ class ContractTest(parameterized.TestCase):
 
   def test_expert_share_puts_expert_rows_into_the_batch(self):
     agent = _build(expert_share=0.25)
-    batch = agent._batches.draw(0).batch
+    batch = agent.batches.draw(0).batch
     rows = {
       row.tobytes()
       for part in synthetic.demonstrations(TASKS, 200, OBS, A).values()

@@ -53,7 +53,7 @@ class StoredRewardsTest(absltest.TestCase):
   def test_batches_carry_each_tasks_own_reward(self):
     replay = _replay()
     agent = _build(replay, {}, reward_source="replay")
-    batch = agent._batches.draw(0).batch
+    batch = agent.batches.draw(0).batch
     by_row = {
       row.tobytes(): rewards
       for row, rewards in zip(
@@ -68,7 +68,7 @@ class StoredRewardsTest(absltest.TestCase):
   def test_there_is_no_discriminator_and_no_need_of_demonstrations(self):
     agent = _build(shown={}, reward_source="replay")
     agent.update()
-    self.assertIsNone(agent._learner.networks.discriminator)
+    self.assertIsNone(agent.learner.networks.discriminator)
     metrics = agent.metrics()
     self.assertTrue(math.isnan(metrics["loss/discriminator"]))
     self.assertTrue(math.isfinite(metrics["loss/critic"]))
@@ -78,8 +78,8 @@ class StoredRewardsTest(absltest.TestCase):
     agent = _build(
       shown={}, reward_source="replay", reward_clip=0.5, reward_scale=0.1
     )
-    batch = agent._batches.draw(0).batch
-    reward = agent._learner._rewards_of(batch)
+    batch = agent.batches.draw(0).batch
+    reward = agent.learner._rewards_of(batch)
     torch.testing.assert_close(reward, 0.1 * batch.reward.clamp(-0.5, 0.5))
     self.assertAlmostEqual(reward.abs().max().item(), 0.05, places=6)
 
@@ -124,7 +124,7 @@ class ExamplesTest(parameterized.TestCase):
     agent = _build(
       shown=shown, reward_source="examples", batch_size=64, example_noise=0.0
     )
-    draw = agent._batches.draw(0)
+    draw = agent.batches.draw(0)
     self.assertIsNone(draw.discriminator_batch)
     owner = draw.batch.owner.tolist()
     # 32 examples: 10 a task, and 2 more for the main task.
@@ -150,13 +150,13 @@ class ExamplesTest(parameterized.TestCase):
 
   def test_an_example_gets_an_action_of_its_tasks_intention(self):
     agent = _build(reward_source="examples")
-    learner, heads = agent._learner, agent._learner.networks.intentions.heads
+    learner, heads = agent.learner, agent.learner.networks.intentions.heads
     with torch.no_grad():  # task k always acts tanh(k)
       heads.output.weight.zero_()
       heads.output.bias.fill_(-50.0)
       for task in range(len(TASKS)):
         heads.output.bias[task, :, :A] = task
-    before = agent._batches.draw(0).batch
+    before = agent.batches.draw(0).batch
     after = learner._with_fresh_actions(before)
     kept = before.owner < 0
     torch.testing.assert_close(after.action[kept], before.action[kept])
@@ -170,14 +170,14 @@ class ExamplesTest(parameterized.TestCase):
       agent = _build(  # with the trunk frozen, tasks share nothing
         reward_source="examples", freeze_updates=1, max_gradient_norm=1e9
       )
-      draw = agent._batches.draw(0)
+      draw = agent.batches.draw(0)
       others = (draw.batch.owner > 0)[:, None]
       batch = draw.batch._replace(
         inputs=draw.batch.inputs + shift * others,
         next_inputs=draw.batch.next_inputs + shift * others,
       )
-      agent._learner.update(batch)
-      networks = agent._learner.networks
+      agent.learner.update(batch)
+      networks = agent.learner.networks
       metrics.append(
         [
           networks.critics.heads.output.weight[[0, 3]].clone(),
@@ -198,8 +198,8 @@ class ExamplesTest(parameterized.TestCase):
     for _ in range(300):
       agent.update()
     metrics = agent.metrics()
-    batch = agent._learner._with_fresh_actions(agent._batches.draw(0).batch)
-    q = agent._learner.networks.critics(batch.inputs, batch.action)[0]
+    batch = agent.learner._with_fresh_actions(agent.batches.draw(0).batch)
+    q = agent.learner.networks.critics(batch.inputs, batch.action)[0]
     for task in range(len(TASKS)):
       own = q[task][batch.owner == task].mean().item()
       rest = q[task][batch.owner < 0].mean().item()
@@ -213,7 +213,7 @@ class ExamplesTest(parameterized.TestCase):
 
   def test_transitions_come_first(self):
     agent = _build(reward_source="examples")
-    batch = agent._batches.draw(0).batch
+    batch = agent.batches.draw(0).batch
     joined = with_examples(batch._replace(owner=None), batch)
     self.assertEqual(joined.owner[:32].tolist(), [-1] * 32)
 

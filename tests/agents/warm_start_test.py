@@ -56,7 +56,7 @@ class FreezeTest(parameterized.TestCase):
       bc_weight=1.0,
       intention_learning_rate=1e-3,
     )
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     trunk = networks.intentions.trunk
     start, heads = _states(trunk), _states(networks.critics.heads)
     for _ in range(2):
@@ -71,7 +71,7 @@ class FreezeTest(parameterized.TestCase):
     agent = _build(
       freeze_updates=5, bc_warm_start_updates=20, bc_learning_rate=1e-3
     )
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     self.assertIs(networks.intentions.trunk, networks.critics.trunk)
     start = _states(networks.critics.trunk)
     agent.prepare()
@@ -96,7 +96,7 @@ class InitFromTest(parameterized.TestCase):
       agent.policy.act(rows, "reach"), policy.act(rows, "reach")
     )
     self.assertFalse(np.array_equal(agent.policy.act(rows, "stack"), before))
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     self.assertTrue(networks.intentions.owns_trunk)
     self.assertIsNot(networks.intentions.trunk, networks.critics.trunk)
     for critics in (networks.critics, networks.target_critics):
@@ -117,11 +117,11 @@ class InitFromTest(parameterized.TestCase):
 class AbsorbingFlagTest(absltest.TestCase):
   def test_every_network_sees_one_more_input_that_is_0(self):
     agent = _build(absorbing_flag=True, standardise=True)
-    networks = agent._learner.networks
+    networks = agent.learner.networks
     self.assertEqual(networks.critics.trunk.first.in_features, OBS + 1)
     discriminator = networks.discriminator
     self.assertEqual(discriminator.first.in_features, OBS + 1 + A)
-    draw = agent._batches.draw(0)
+    draw = agent.batches.draw(0)
     self.assertEqual(draw.batch.inputs.shape, (32, OBS + 1))
     self.assertTrue((draw.batch.inputs[:, -1] == 0).all())
     self.assertTrue((draw.expert.inputs[..., -1] == 0).all())

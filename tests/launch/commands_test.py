@@ -203,16 +203,27 @@ class BlockRunTest(absltest.TestCase):
         "benchmark.py --what=stability --steps=50 --tasks=reach",
         "benchmark.py --what=training --steps=3 --config.agent.hidden_size=16",
         "benchmark.py --what=learner --seconds=0 --config.agent.hidden_size=16",
+        "benchmark.py --what=memory --steps=3 --config.agent.hidden_size=16 "
+        "--config.replay_capacity=2000",
       )
       calls = list(pool.map(self._call, lines))
     names = [_names(done) for done in calls]
     self.assertEqual(
-      names[0], ["control_steps_per_s", "mj_step_per_s", "reset_ms"]
+      names[0],
+      [
+        "control_steps_per_s",
+        "mj_step_per_s",
+        "mj_step_fraction",
+        "reset_ms",
+        *(f"vector_steps_per_s_{count}" for count in (1, 2, 4)),
+      ],
     )
     self.assertContainsSubset(
       ["steps", "nan", "warnings", "blocks_out", "max_block_speed"], names[1]
     )
-    self.assertEqual(names[2], ["loop_steps_per_s", "learner_updates_per_s"])
+    self.assertContainsSubset(
+      ["loop_steps_per_s", "learner_updates_per_s", "loop_fraction"], names[2]
+    )
     self.assertContainsSubset(
       [
         "gflop_per_update",
@@ -223,6 +234,7 @@ class BlockRunTest(absltest.TestCase):
       ],
       names[3],
     )
+    self.assertContainsSubset(["resident_gb/0", "resident_gb"], names[4])
 
 
 def _names(done: subprocess.CompletedProcess) -> list[str]:

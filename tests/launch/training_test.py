@@ -47,8 +47,9 @@ class TrainingTest(parameterized.TestCase):
     stored = run_folder.read_config(self.run)
     self.assertEqual(stored["policy"]["env_step"], 200)
 
-  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
-    config = self._config()
+  @parameterized.parameters(False, True)
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self, actor_process):
+    config = self._config(actor_process=actor_process)
     self._train(config)
     other = self.folder / "runs" / "b"
     real, calls = training._Run._checkpoint, []

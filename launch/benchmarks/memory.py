@@ -1,0 +1,69 @@
+"""Memory of a learner whose replay is full: does it stay where it is."""
+
+import pathlib
+import tempfile
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+import tqdm
+
+from agents import synthetic
+from launch.benchmarks import learner
+from launch.configs import RunConfig
+from lfgp_dmc import observations
+from lfgp_dmc.replay import Replay
+
+_ACTION_SIZE = 4
+_CHUNK = 50_000  # rows filled at a time
+_READINGS = 10
+
+
+def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
+  """Fills a replay on disk to its capacity, then makes updates on it.
+
+  Args:
+    config: whose agent, and `replay_capacity`; demonstrations are made up.
+    updates: how many.
+
+  Yields:
+    `replay_rows`; `resident_gb/<updates so far>`: the process's resident
+    memory, mapped pages counted (Linux: VmRSS), before the first update and
+    after every tenth part of them; `resident_gb`: the most of these.
+  """
+  torch.set_num_threads(config.threads or 1)
+  with tempfile.TemporaryDirectory(dir=".") as folder:
+    replay = Replay(
+      config.replay_capacity,
+      observations.OBSERVATION_SIZE,
+      _ACTION_SIZE,
+      pathlib.Path(folder) / "replay",
+    )
+    _fill(replay)
+    yield "replay_rows", len(replay)
+    agent = learner.make_agent(config, replay)
+    readings = [resident_gb()]
+    yield "resident_gb/0", readings[0]
+    part = max(1, updates // _READINGS)
+    for update in tqdm.trange(1, updates + 1, unit="update", mininterval=1.0):
+      agent.update()
+      if update % part == 0:
+        readings.append(resident_gb())
+        yield f"resident_gb/{update}", readings[-1]
+    yield "resident_gb", max(readings)
+
+
+def resident_gb() -> float:
+  """This process's resident memory, mapped files included, in GB (10^9)."""
+  status = pathlib.Path("/proc/self/status").read_text()
+  (line,) = (line for line in status.splitlines() if line.startswith("VmRSS"))
+  return 1024e-9 * int(line.split()[1])
+
+
+def _fill(replay: Replay) -> None:
+  rows = synthetic.transitions(
+    _CHUNK, observations.OBSERVATION_SIZE, _ACTION_SIZE
+  )
+  for start in tqdm.trange(0, replay.capacity, _CHUNK, desc="filling"):
+    count = min(_CHUNK, replay.capacity - start)
+    replay.add_batch(type(rows)(*(np.asarray(part)[:count] for part in rows)))
