@@ -89,9 +89,7 @@ class TwinCriticHeads(nn.Module):
     return value.float().reshape(2, self.tasks, rows)
 
 
-def _single_outputs(
-  hidden: torch.Tensor, layer: StackedLinear
-) -> torch.Tensor:
+def _single_outputs(hidden: torch.Tensor, layer: StackedLinear) -> torch.Tensor:
   """The one output of each group, [G, B], of hidden [G, B, H].
 
   A float32 product of matrix and vector takes six times as long as this on a

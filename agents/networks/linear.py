@@ -34,9 +34,7 @@ class Linear(nn.Linear):
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
     """Maps [..., inputs] to [..., outputs]."""
     dtype = inputs.dtype
-    return functional.linear(
-      inputs, self.weight.to(dtype), self.bias.to(dtype)
-    )
+    return functional.linear(inputs, self.weight.to(dtype), self.bias.to(dtype))
 
 
 def make_linear(

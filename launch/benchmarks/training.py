@@ -47,9 +47,10 @@ def measure(
   for threads in (1, 2):
     torch.set_num_threads(threads)
     rates[threads] = learner.rate(agent.update, seconds)
-    yield f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}", rates[
-      threads
-    ]
+    yield (
+      f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}",
+      rates[threads],
+    )
   threads = max(rates, key=rates.__getitem__)
   torch.set_num_threads(threads)
   yield "loop_threads", threads

@@ -55,7 +55,9 @@ class VectorEnvironmentTest(absltest.TestCase):
         rows = lfgp_dmc.flatten(together.observation)
         self.assertEqual(rows.shape, (2, 59))
         for row, alone in zip(rows, apart, strict=True):
-          np.testing.assert_array_equal(row, lfgp_dmc.flatten(alone.observation))
+          np.testing.assert_array_equal(
+            row, lfgp_dmc.flatten(alone.observation)
+          )
         actions = random.uniform(-1, 1, (2, 4))
         together = vector.step(actions)
         apart = [s.step(a) for s, a in zip(singles, actions, strict=True)]

@@ -1,0 +1,205 @@
+"""The fast update against the equations, task by task, by plain autograd."""
+
+import itertools
+
+import numpy as np
+import torch
+from absl.testing import absltest, parameterized
+from torch.nn import functional
+
+from agents import synthetic
+from agents.experts import Batch, ExpertPool
+from agents.lfgp.config import LfgpConfig
+from agents.lfgp.learner import LfgpLearner
+from agents.lfgp.networks import make_networks
+from agents.networks.trunk import Standardiser
+
+TASKS = ("main", "first", "second")
+K, OBS, A, H, B, N = len(TASKS), 59, 4, 32, 24, 16
+GAMMA, LAMBDA = 0.99, 10.0
+
+
+def _learner(**fields):
+  """Steps too small to move a float, so that all losses meet one state."""
+  rates = dict.fromkeys(
+    [
+      "critic_learning_rate",
+      "intention_learning_rate",
+      "temperature_learning_rate",
+      "discriminator_learning_rate",
+    ],
+    1e-30,
+  )
+  config = LfgpConfig(
+    hidden_size=H,
+    batch_size=B,
+    discriminator_batch_size=N,
+    max_gradient_norm=1e9,
+    initial_temperature=0.3,
+    **rates,
+    **fields,
+  )
+  networks = make_networks(
+    config,
+    K,
+    A,
+    Standardiser(OBS),
+    torch.Generator().manual_seed(1),
+    torch.device("cpu"),
+  )
+  with torch.no_grad():  # keeps the target apart from the online network
+    for parameter in networks.target_critics.parameters():
+      parameter.mul_(1.3)
+  return LfgpLearner(config, networks, torch.Generator().manual_seed(2))
+
+
+def _layer(inputs, weight, bias):
+  return inputs @ weight + bias
+
+
+class Plain:
+  """What the paper's equations say, one task and one critic at a time."""
+
+  def __init__(self, networks, generator):
+    self.networks = networks
+    self.noise = generator
+
+  def discriminator(self, pairs):
+    n = self.networks.discriminator
+    first = torch.tanh(functional.linear(pairs, n.first.weight, n.first.bias))
+    second = torch.tanh(
+      functional.linear(first, n.second.weight, n.second.bias)
+    )
+    return functional.linear(second, n.output.weight, n.output.bias)
+
+  def discriminator_loss(self, policy, expert):
+    share = torch.rand((K, N, policy.shape[1]), generator=self.noise)
+    loss, norms = 0.0, []
+    for k in range(K):
+      loss += 0.5 * functional.softplus(self.discriminator(policy)[:, k]).mean()
+      loss += (
+        0.5 * functional.softplus(-self.discriminator(expert[k])[:, k]).mean()
+      )
+      mixed = share[k] * policy[:N] + (1 - share[k]) * expert[k]
+      mixed.requires_grad_()
+      (gradient,) = torch.autograd.grad(
+        self.discriminator(mixed).sum(), mixed, create_graph=True
+      )
+      norms.append(gradient.norm(dim=1))
+    return loss / K + LAMBDA * (torch.cat(norms) - 1).square().mean()
+
+  def trunk(self, module, state):
+    if not list(module.parameters()):
+      return state
+    for layer in (module.first, module.second):
+      state = torch.relu(functional.linear(state, layer.weight, layer.bias))
+    return state
+
+  def intention(self, k, state, noise):
+    heads = self.networks.intentions.heads
+    hidden = self.trunk(self.networks.intentions.trunk, state).detach()
+    for layer in (heads.hidden, heads.second):
+      if layer is not None:
+        hidden = torch.relu(_layer(hidden, layer.weight[k], layer.bias[k]))
+    out = _layer(hidden, heads.output.weight[k], heads.output.bias[k])
+    mean, deviation = out[:, :A], functional.softplus(out[:, A:]) + 1e-7
+    value = mean + deviation * noise
+    density = torch.distributions.Normal(mean, deviation).log_prob(value)
+    correction = 2 * (np.log(2) - value - functional.softplus(-2 * value))
+    return torch.tanh(value), (density - correction).sum(1)
+
+  def q(self, critics, twin, k, state, action):
+    heads, g = critics.heads, twin * K + k
+    features = self.trunk(critics.trunk, state)
+    weight = torch.cat([heads.feature_weight[g], heads.action_weight[g]])
+    hidden = _layer(torch.cat([features, action], 1), weight, heads.bias[g])
+    if heads.second is not None:
+      hidden = _layer(
+        torch.relu(hidden), heads.second.weight[g], heads.second.bias[g]
+      )
+    out = _layer(
+      torch.relu(hidden), heads.output.weight[g], heads.output.bias[g]
+    )
+    return out[:, 0]
+
+  def critic_loss(self, batch):
+    noise = torch.randn((K, B, A), generator=self.noise)
+    critics, target = self.networks.critics, self.networks.target_critics
+    loss = 0.0
+    for k in range(K):
+      with torch.no_grad():
+        alpha = self.networks.log_temperature[k].exp()
+        action, log_prob = self.intention(k, batch.next_inputs, noise[k])
+        value = torch.minimum(
+          self.q(target, 0, k, batch.next_inputs, action),
+          self.q(target, 1, k, batch.next_inputs, action),
+        )
+        reward = self.discriminator(torch.cat([batch.inputs, batch.action], 1))[
+          :, k
+        ]
+        wanted = reward + GAMMA * (value - alpha * log_prob)
+      for twin in range(2):
+        q = self.q(critics, twin, k, batch.inputs, batch.action)
+        loss += (q - wanted).square().mean()
+    return loss
+
+  def intention_losses(self, state):
+    noise = torch.randn((K, B, A), generator=self.noise)
+    policy = temperature = 0.0
+    for k in range(K):
+      alpha = self.networks.log_temperature[k].exp()
+      action, log_prob = self.intention(k, state, noise[k])
+      value = torch.minimum(
+        *(self.q(self.networks.critics, i, k, state, action) for i in range(2))
+      )
+      policy += (alpha.detach() * log_prob - value).mean()
+      temperature += (-alpha * (log_prob.detach() - 4.0)).mean()
+    return policy, temperature
+
+
+class PlainUpdateTest(parameterized.TestCase):
+  @parameterized.parameters({}, {"layout": "separate"})
+  def test_losses_and_gradients_equal_the_equations(self, **fields):
+    learner = _learner(**fields)
+    networks = learner.networks
+    batch, other = (
+      Batch(*map(torch.from_numpy, synthetic.transitions(B, OBS, A, seed)))
+      for seed in (0, 1)
+    )
+    pool = ExpertPool(
+      synthetic.demonstrations(TASKS, 60, OBS, A), TASKS, Standardiser(OBS)
+    )
+    expert = pool.sample(np.random.default_rng(0), N)
+    plain = Plain(networks, torch.Generator().manual_seed(2))
+    policy_pairs = torch.cat([other.inputs, other.action], 1)
+    expert_pairs = torch.cat([expert.inputs, expert.action], 2)
+    parts = {
+      "discriminator": list(networks.discriminator.parameters()),
+      "critic": list(networks.critics.parameters()),
+      "policy": list(networks.intentions.heads.parameters()),
+      "temperature": [networks.log_temperature],
+    }
+    # In the order in which the update draws its noise.
+    losses = [
+      plain.discriminator_loss(policy_pairs, expert_pairs),
+      plain.critic_loss(batch),
+      *plain.intention_losses(batch.inputs),
+    ]
+    expected = [
+      torch.autograd.grad(loss, parameters, retain_graph=True)
+      for loss, parameters in zip(losses, parts.values(), strict=True)
+    ]
+    metrics = learner.update(batch, other, expert)
+    found = metrics["loss/discriminator"] + metrics["loss/gradient_penalty"]
+    torch.testing.assert_close(found, losses[0].detach())
+    for name, loss in zip(list(parts)[1:], losses[1:], strict=True):
+      torch.testing.assert_close(metrics[f"loss/{name}"], loss.detach())
+    gradients = [[p.grad for p in group] for group in parts.values()]
+    for one, other_one in zip(
+      itertools.chain(*gradients), itertools.chain(*expected), strict=True
+    ):
+      torch.testing.assert_close(one, other_one, rtol=1e-4, atol=2e-5)
+
+
+if __name__ == "__main__":
+  absltest.main()
