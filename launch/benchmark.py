@@ -18,15 +18,23 @@ from launch import command, config_flags, configs
 from launch.command import UserError
 from lfgp_dmc import files
 
+_DEFAULT_STEPS = {
+  "environment": 7_200,
+  "learner": 0,  # it is timed instead
+  "training": 1_000,
+  "memory": 20_000,
+  "stability": 200_000,
+}
+
 _WHAT = flags.DEFINE_enum(
   "what",
   "environment",
-  ["environment", "learner", "training", "memory", "stability"],
-  "environment: control steps a second through dm_env, the physics' alone, "
-  "a reset's time, and environments side by side. learner: updates a second, "
-  "against matrix products. training: steps a second of the whole loop, against "
-  "the learner alone. memory: with a full replay on disk. stability: random steps that "
-  "count NaN, MuJoCo's warnings and lost blocks.",
+  list(_DEFAULT_STEPS),
+  "environment: control steps a second through dm_env, the physics' alone, a "
+  "reset's time, environments side by side. learner: updates a second, against "
+  "matrix products. training: the whole loop, against the learner alone. "
+  "memory: with a full replay on disk. stability: random steps that count NaN, "
+  "MuJoCo's warnings and lost blocks.",
 )
 _STEPS = flags.DEFINE_integer(
   "steps",
@@ -43,13 +51,6 @@ _SECONDS = flags.DEFINE_float(
   "seconds", 8.0, "Of each measurement of updates.", lower_bound=0.0
 )
 _OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
-
-_DEFAULT_STEPS = {
-  "environment": 7_200,
-  "training": 1_000,
-  "memory": 20_000,
-  "stability": 200_000,
-}
 
 
 def main() -> None:
@@ -79,7 +80,7 @@ def main() -> None:
 
 def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
   # Imported when needed: each needs only the simulator or only torch.
-  steps = _STEPS.value or _DEFAULT_STEPS.get(_WHAT.value, 0)
+  steps = _STEPS.value or _DEFAULT_STEPS[_WHAT.value]
   match _WHAT.value:
     case "environment":
       from launch.benchmarks import environment

@@ -211,7 +211,7 @@ class _Run:
           progress=self._progress,
         )
       if self._config.actor_process:
-        remote = self._make_remote_actor()
+        remote = self._make_remote_actor(self._replay.reward_tasks)
       return loop.train(
         self._environment,
         self._agent,
@@ -230,14 +230,14 @@ class _Run:
       self._log.close()
       self._environment.close()
 
-  def _make_remote_actor(self) -> RemoteActor:
+  def _make_remote_actor(self, reward_tasks: tuple[str, ...]) -> RemoteActor:
     config = self._config
     return RemoteActor(
       functools.partial(
         worlds.build, config.environment, config.main_task, config.keeps_rewards
       ),
       functools.partial(actors.sampling_policy, self._agent.policy_options()),
-      self._replay.reward_tasks,
+      reward_tasks,
     )
 
   def _evaluate(self, env_step: int) -> dict[str, float]:

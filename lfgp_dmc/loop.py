@@ -284,7 +284,6 @@ def passed(before: int, now: int, every: int) -> bool:
 
 def _episode(steps: Sequence[Step]) -> Episode:
   observations, actions, _ = zip(*(s.transition for s in steps), strict=True)
-  kept = None
-  if steps[0].rewards is not None:
-    kept = np.stack([step.rewards for step in steps])
+  rewards = [step.rewards for step in steps if step.rewards is not None]
+  kept = np.stack(rewards) if rewards else None
   return Episode(np.stack(observations), np.stack(actions), kept)

@@ -153,7 +153,8 @@ def _play(
   actor = make_actor(request.arrays)
   actor.begin(request.task, request.seed)
   random = seeding.generator(request.seed, "random actions")
-  observation, played = flatten(timestep.observation), []
+  observation = flatten(timestep.observation)
+  played: list[Step] = []
   while len(played) < request.steps and not timestep.last():
     action = actor.act(observation)
     if len(played) < request.random_steps:
