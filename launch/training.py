@@ -98,8 +98,7 @@ def set_up_torch(config: RunConfig) -> torch.device:
   Raises:
     UserError: there is no such device.
   """
-  if config.threads:
-    torch.set_num_threads(config.threads)
+  torch.set_num_threads(config.threads or command.cores())
   if config.deterministic:
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", _DETERMINISTIC_CUBLAS)
     torch.use_deterministic_algorithms(True)

@@ -65,6 +65,7 @@ class Replay:
     self._folder = None if folder is None else pathlib.Path(folder)
     self._total = 0  # rows ever added, less those withdrawn
     self._written = 0  # the most rows ever added: later ones overwrote
+    self._low_mark = 0  # the smallest total since it was last asked for
     self._reserved = 0  # rows known to have disk under them
     self._mapped: list[np.memmap] = []
     columns = {name: self._column(name) for name in self._widths}
@@ -150,6 +151,7 @@ class Replay:
     if not 0 <= rows <= len(self):
       raise ValueError(f"cannot withdraw {rows} of {len(self)} rows")
     self._total -= rows
+    self._low_mark = min(self._low_mark, self._total)
 
   def rewind(self, total: int) -> None:
     """Goes back to when `total` rows had been added (a checkpoint).
@@ -164,10 +166,16 @@ class Replay:
         f"to {total}"
       )
     self._total = total
+    self._low_mark = min(self._low_mark, total)
 
   def clear(self) -> None:
     """Forgets every row."""
-    self._total = self._written = 0
+    self._total = self._written = self._low_mark = 0
+
+  def take_low_mark(self) -> int:
+    """The smallest `total` since the last call: rows below have not changed."""
+    mark, self._low_mark = min(self._low_mark, self._total), self._total
+    return mark
 
   def sample_indices(
     self, generator: np.random.Generator, count: int

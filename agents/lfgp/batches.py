@@ -8,26 +8,20 @@ import torch
 
 from agents.experts import Batch, ExpertBatch, ExpertPool
 from agents.lfgp.config import LfgpConfig
-from lfgp_dmc.types import Transition
+from agents.lfgp.device_rows import DeviceRows, RingReplay
 
 
-class Replay(Protocol):
+class Replay(RingReplay, Protocol):
   """The transitions that the agent samples; the training loop adds them."""
 
   @property
   def reward_tasks(self) -> tuple[str, ...]:
     """The tasks whose dense rewards are kept beside each row."""
 
-  def __len__(self) -> int:
-    """Transitions stored."""
-
   def sample_indices(
     self, generator: np.random.Generator, count: int, /
   ) -> np.ndarray:
     """Draws int64 [count], uniform with replacement."""
-
-  def gather(self, indices: np.ndarray, /) -> Transition:
-    """Copies rows out: float32 arrays [n, ...]."""
 
   def gather_rewards(self, indices: np.ndarray, /) -> np.ndarray:
     """Copies their rewards out: float32 [n, `reward_tasks`]."""
@@ -75,6 +69,10 @@ class BatchMaker:
     self._experts = experts
     self._standardise = standardise
     self._device = device
+    # A GPU keeps a copy of the rows; see `device_rows.py`.
+    self._rows = None
+    if device.type != "cpu":
+      self._rows = DeviceRows(replay, device)
     self._columns: list[int] = []
     if config.reward_source == "replay":
       self._columns = reward_columns(replay, tasks)
@@ -127,17 +125,22 @@ class BatchMaker:
   def _transitions(self, rows: int) -> Batch:
     """Transitions of the replay, with their rewards if those are used."""
     indices = self._replay.sample_indices(self.generator, rows)
-    part = self._replay.gather(indices)
+    observation, action, following = self._gather(indices)
     reward = None
     if self._columns:
       stored = self._replay.gather_rewards(indices)[:, self._columns]
       reward = self.put(stored.T)
     return Batch(
-      self._standardise(self.put(part.observation)),
-      self.put(part.action),
-      self._standardise(self.put(part.next_observation)),
+      self._standardise(observation),
+      action,
+      self._standardise(following),
       reward,
     )
+
+  def _gather(self, indices: np.ndarray) -> tuple[torch.Tensor, ...]:
+    if self._rows is not None:
+      return self._rows.gather(indices)
+    return tuple(map(self.put, self._replay.gather(indices)))
 
   def _pool(self) -> ExpertPool:
     assert self._experts is not None, "this config uses demonstrations"

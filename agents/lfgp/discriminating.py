@@ -76,8 +76,7 @@ class DiscriminatorLearner:
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Every task's reward [K, B] of inputs [B, O] and actions [B, A]."""
     config, network = self._config, self._network
-    with torch.no_grad():
-      logits = network(network.join(inputs, action).to(self._dtype))
+    logits = network.logits(network.join(inputs, action).to(self._dtype))
     return reward_from_logits(
       logits.t(), config.reward, config.reward_clip, config.reward_scale
     )

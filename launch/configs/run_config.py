@@ -45,7 +45,7 @@ class RunConfig:
   # Resources.
   replay_capacity: int = 4_000_000  # transitions
   device: str = "auto"  # cpu, cuda, ...; auto: cuda where there is one
-  threads: int = 1  # of torch; 0: torch's own choice
+  threads: int = 1  # of torch; 0: one a core that this process may use
   actor_process: bool = False  # act in another process, while this one learns
   deterministic: bool = False  # the same numbers again, after a resume too
 

@@ -149,6 +149,12 @@ class DiscriminatorTest(parameterized.TestCase):
       gradients(*found), gradients(*expected), rtol=1e-4, atol=1e-5
     )
 
+  def test_logits_without_gradient_are_the_same(self):
+    network = Discriminator(K, OBS, A, H, _generator())
+    pairs = torch.randn(5, OBS + A, generator=_generator())
+    torch.testing.assert_close(network.logits(pairs), network(pairs).detach())
+    self.assertFalse(network.logits(pairs).requires_grad)
+
   def test_state_input_ignores_the_action(self):
     network = Discriminator(K, OBS, A, H, _generator(), "state")
     state = torch.randn(B, OBS, generator=_generator())

@@ -1,0 +1,90 @@
+"""The replay's rows once more, on the device that learns.
+
+A GPU that fetched its rows from the host for every update would mostly wait.
+Here each row crosses over once; batches are then gathered on the device.
+"""
+
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from lfgp_dmc.types import Transition
+
+_CHUNK = 65_536  # rows copied at a time
+
+
+class RingReplay(Protocol):
+  """What is read of the replay; see `lfgp_dmc.replay.Replay`."""
+
+  @property
+  def capacity(self) -> int:
+    """The most rows that can be sampled."""
+
+  @property
+  def total(self) -> int:
+    """Rows ever added, less those withdrawn."""
+
+  @property
+  def widths(self) -> tuple[int, int]:
+    """The sizes (O, A)."""
+
+  def take_low_mark(self) -> int:
+    """The smallest `total` since the last call: rows below have not changed."""
+
+  def __len__(self) -> int:
+    """Rows that can be sampled."""
+
+  def gather(self, indices: np.ndarray, /) -> Transition:
+    """Copies rows out; index 0 is the oldest."""
+
+
+class DeviceRows:
+  """A copy of the rows that can be sampled, brought up to date as they grow."""
+
+  def __init__(self, replay: RingReplay, device: torch.device):
+    """Takes memory for all of the capacity, 488 bytes a row at 59 + 4 floats.
+
+    Args:
+      replay: the transitions on the host; the training loop adds to it.
+      device: where to keep them.
+    """
+    self._replay = replay
+    observations, actions = replay.widths
+    self._columns = [
+      torch.empty((replay.capacity, width), device=device)
+      for width in (observations, actions, observations)
+    ]
+    self._copied = 0  # rows below this number are here
+
+  def gather(self, indices: np.ndarray) -> tuple[torch.Tensor, ...]:
+    """Gathers what `replay.gather(indices)` would, on the device.
+
+    Args:
+      indices: int64 [B]; 0 is the oldest row.
+
+    Returns:
+      Observations [B, O], actions [B, A], next observations [B, O].
+    """
+    self._catch_up()
+    oldest = self._replay.total - len(self._replay)
+    rows = torch.from_numpy((indices + oldest) % self._replay.capacity)
+    rows = rows.to(self._columns[0].device)
+    observation, action, following = (
+      column.index_select(0, rows) for column in self._columns
+    )
+    return observation, action, following
+
+  def _catch_up(self) -> None:
+    """Copies what was added, and anew what was withdrawn and replaced."""
+    replay = self._replay
+    oldest = replay.total - len(replay)
+    start = max(oldest, min(self._copied, replay.take_low_mark()))
+    for first in range(start, replay.total, _CHUNK):
+      numbers = np.arange(first, min(first + _CHUNK, replay.total))
+      rows = torch.from_numpy(numbers % replay.capacity)
+      fresh = replay.gather(numbers - oldest)
+      for column, values in zip(self._columns, fresh, strict=True):
+        rows = rows.to(column.device)
+        column[rows] = torch.from_numpy(values).to(column.device)
+    self._copied = replay.total
