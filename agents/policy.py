@@ -60,7 +60,8 @@ class Policy:
       arrays: name -> array.
       options: `tasks` (list of str), `observation_size`, `action_size`,
         `hidden_size` (int), `layout` (of `networks/layouts.py`; missing: a
-        shared trunk), `absorbing_flag` (missing: False): an agent's
+        shared trunk), `absorbing_flag` (missing: False), `fine_scale`
+        (missing: 0): an agent's
         `policy_options`.
 
     Returns:
@@ -89,7 +90,9 @@ class Policy:
     observations, actions, hidden = (options[name] for name in _SIZES)
     generator = torch.Generator()
     standardiser = Standardiser(
-      observations, bool(options.get("absorbing_flag", False))
+      observations,
+      bool(options.get("absorbing_flag", False)),
+      float(options.get("fine_scale", 0.0)),
     )
     inputs = standardiser.input_size
     network = IntentionNetwork(
@@ -164,6 +167,7 @@ class Policy:
       "hidden_size": network.heads.output.weight.shape[1],
       "layout": layouts.layout_of(network.heads),
       "absorbing_flag": network.standardiser.absorbing_flag,
+      "fine_scale": network.standardiser.fine_scale,
     }
 
   @property

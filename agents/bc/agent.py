@@ -196,16 +196,17 @@ def build(
   device = torch.device(device)
   observation = pooled_observations(demonstrations, tasks)
   check_sizes(demonstrations, tasks, observation_size, action_size)
-  standardiser = Standardiser(observation_size)
+  standardiser = Standardiser(observation_size, fine_scale=config.fine_scale)
   if config.standardise:
     standardiser.fit(observation, config.deviation_floor)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   layout, hidden = config.layout, config.hidden_size
+  inputs = standardiser.input_size
   network = IntentionNetwork(
     standardiser,
-    layouts.make_trunk(layout, observation_size, hidden, initial),
+    layouts.make_trunk(layout, inputs, hidden, initial),
     layouts.make_intention_heads(
-      layout, len(tasks), observation_size, hidden, action_size, initial
+      layout, len(tasks), inputs, hidden, action_size, initial
     ),
     owns_trunk=True,
   ).to(device)

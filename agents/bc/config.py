@@ -15,6 +15,7 @@ class BcConfig:
   layout: str = layouts.SEPARATE  # multitask BC: "shared_trunk"
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
   deviation_floor: float = 0.01  # smallest deviation, in the input's unit
+  fine_scale: float = 0.0  # c of inputs tanh(x / c) beside x (m); 0: none
   bfloat16: bool = False  # products in bfloat16; parameters stay float32
 
   # Training.
@@ -35,7 +36,7 @@ class BcConfig:
 _RANGES = {
   "an integer above 0": "hidden_size batch_size overfit_tolerance",
   "a number above 0": "deviation_floor learning_rate",
-  "a number, 0 or more": "weight_decay max_gradient_norm",
+  "a number, 0 or more": "weight_decay max_gradient_norm fine_scale",
   "a number above 0, below 1": "validation_share",
   "True or False": "standardise bfloat16",
 }

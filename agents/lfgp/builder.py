@@ -51,7 +51,9 @@ def build(
       rewards that are needed, or the scheduler does not fit the tasks.
   """
   device = torch.device(device)
-  standardiser = Standardiser(observation_size, config.absorbing_flag)
+  standardiser = Standardiser(
+    observation_size, config.absorbing_flag, config.fine_scale
+  )
   experts = None
   if config.uses_demonstrations:
     observation = pooled_observations(demonstrations, tasks)

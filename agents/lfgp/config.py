@@ -31,6 +31,7 @@ class LfgpConfig:
   critic_layer_norm: bool = False
   standardise: bool = False  # inputs by the demonstrations' mean, deviation
   deviation_floor: float = 0.01  # smallest deviation, in the input's unit
+  fine_scale: float = 0.0  # c of inputs tanh(x / c) beside x (m); 0: none
   absorbing_flag: bool = False  # a last input, 0: no state is absorbing here
   bfloat16: bool = False  # products in bfloat16; parameters stay float32
 
@@ -186,7 +187,7 @@ _NUMBERS_ABOVE_0 = (
 )
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
-  "value_penalty example_noise"
+  "value_penalty example_noise fine_scale"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "

@@ -11,22 +11,28 @@ from agents.networks.linear import make_linear
 class Standardiser(nn.Module):
   """Maps raw observations to network inputs: (x - mean) / deviation.
 
-  With the absorbing flag of the released code's wrapper, a 0 comes last: its
+  With a fine scale c, tanh(x / c) follows for every float: what differs by
+  millimetres near 0, such as a block from its slot, is told apart there, while
+  (x - mean) / deviation tells centimetres. With the absorbing flag of the released code's wrapper, a 0 comes last: its
   episodes end by time alone, so that no state is ever absorbing.
   """
 
   mean: torch.Tensor
   deviation: torch.Tensor
 
-  def __init__(self, size: int, absorbing_flag: bool = False):
-    """Starts as the identity.
+  def __init__(
+    self, size: int, absorbing_flag: bool = False, fine_scale: float = 0.0
+  ):
+    """Starts as the identity, what the fine scale adds apart.
 
     Args:
       size: O, floats of an observation.
       absorbing_flag: whether inputs get one more float, 0.
+      fine_scale: c, in the observations' own units; 0: no fine floats.
     """
     super().__init__()
     self.absorbing_flag = absorbing_flag
+    self.fine_scale = fine_scale
     self.register_buffer("mean", torch.zeros(size))
     self.register_buffer("deviation", torch.ones(size))
 
@@ -44,16 +50,20 @@ class Standardiser(nn.Module):
     self.deviation.copy_(torch.from_numpy(deviation))
 
   def forward(self, observation: torch.Tensor) -> torch.Tensor:
-    """Returns standardised [..., O], or [..., O + 1] with the flag."""
+    """Returns [..., input_size]: standardised, fine, flag."""
     inputs = (observation - self.mean) / self.deviation
+    if self.fine_scale:
+      fine = torch.tanh(observation / self.fine_scale)
+      inputs = torch.cat([inputs, fine], dim=-1)
     if self.absorbing_flag:
       inputs = functional.pad(inputs, (0, 1))
     return inputs
 
   @property
   def input_size(self) -> int:
-    """Floats that a network gets: O, or O + 1."""
-    return self.mean.shape[0] + self.absorbing_flag
+    """Floats that a network gets: O, or 2 O, and 1 more with the flag."""
+    size = self.mean.shape[0]
+    return size + size * bool(self.fine_scale) + self.absorbing_flag
 
 
 class Trunk(nn.Module):

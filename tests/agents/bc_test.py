@@ -202,7 +202,7 @@ class ContractTest(parameterized.TestCase):
 
   @parameterized.parameters((("stack",),), (TASKS,))
   def test_policy_folder_acts_the_same(self, tasks):
-    agent = _build(tasks)
+    agent = _build(tasks, fine_scale=0.1)
     _epoch(agent)
     folder = self.create_tempdir().full_path
     agent.policy.save(folder)
@@ -214,6 +214,7 @@ class ContractTest(parameterized.TestCase):
 
   @parameterized.parameters(
     {"standardise": True},
+    {"fine_scale": 0.01},
     {"bfloat16": True},
     {"weight_decay": 0.01, "max_gradient_norm": 10.0},
   )

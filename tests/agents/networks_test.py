@@ -169,6 +169,15 @@ class StandardiserTest(absltest.TestCase):
     result = standardiser(torch.tensor([[4.0, 6.0]]))
     torch.testing.assert_close(result, torch.tensor([[1.0, 2.0]]))
 
+  def test_fine_floats_follow_and_tell_millimetres_apart(self):
+    standardiser = Standardiser(2, absorbing_flag=True, fine_scale=0.01)
+    result = standardiser(torch.tensor([[0.002, -1.0]]))
+    # tanh(0.2) = 0.197375.
+    torch.testing.assert_close(
+      result, torch.tensor([[0.002, -1.0, 0.197375, -1.0, 0.0]])
+    )
+    self.assertEqual(standardiser.input_size, 5)
+
   def test_starts_as_the_identity(self):
     row = torch.tensor([[1.5, -2.0]])
     torch.testing.assert_close(Standardiser(2)(row), row, rtol=0, atol=0)

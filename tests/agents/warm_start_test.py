@@ -116,9 +116,9 @@ class InitFromTest(parameterized.TestCase):
 
 class AbsorbingFlagTest(absltest.TestCase):
   def test_every_network_sees_one_more_input_that_is_0(self):
-    agent = _build(absorbing_flag=True, standardise=True)
+    agent = _build(absorbing_flag=True, fine_scale=0.1, standardise=True)
     networks = agent.learner.networks
-    self.assertEqual(networks.critics.trunk.first.in_features, OBS + 1)
+    self.assertEqual(networks.critics.trunk.first.in_features, 2 * OBS + 1)
     discriminator = networks.discriminator
     self.assertEqual(discriminator.first.in_features, OBS + 1 + A)
     draw = agent.batches.draw(0)
