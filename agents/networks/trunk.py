@@ -13,8 +13,9 @@ class Standardiser(nn.Module):
 
   With a fine scale c, tanh(x / c) follows for every float: what differs by
   millimetres near 0, such as a block from its slot, is told apart there, while
-  (x - mean) / deviation tells centimetres. With the absorbing flag of the released code's wrapper, a 0 comes last: its
-  episodes end by time alone, so that no state is ever absorbing.
+  (x - mean) / deviation tells centimetres. With the absorbing flag of the
+  released code's wrapper, a 0 comes last: its episodes end by time alone, so
+  that no state is ever absorbing.
   """
 
   mean: torch.Tensor

@@ -120,9 +120,9 @@ class AbsorbingFlagTest(absltest.TestCase):
     networks = agent.learner.networks
     self.assertEqual(networks.critics.trunk.first.in_features, 2 * OBS + 1)
     discriminator = networks.discriminator
-    self.assertEqual(discriminator.first.in_features, OBS + 1 + A)
+    self.assertEqual(discriminator.first.in_features, 2 * OBS + 1 + A)
     draw = agent.batches.draw(0)
-    self.assertEqual(draw.batch.inputs.shape, (32, OBS + 1))
+    self.assertEqual(draw.batch.inputs.shape, (32, 2 * OBS + 1))
     self.assertTrue((draw.batch.inputs[:, -1] == 0).all())
     self.assertTrue((draw.expert.inputs[..., -1] == 0).all())
     agent.update()
