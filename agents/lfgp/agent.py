@@ -145,6 +145,7 @@ class LfgpAgent:
       return
     if self._config.bc_warm_start_updates:
       self._warm_start(progress_bar)
+    self.learner.adopt_prior()
     for _ in tqdm.trange(
       self._first_updates,
       desc="on the other run's replay",
@@ -307,4 +308,6 @@ class LfgpAgent:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")
     intentions.owns_trunk = config.owns_trunk
+    if config.cloned_deviation:  # cloning says nothing of it
+      intentions.heads.set_deviation(config.cloned_deviation)
     self.learner.adopt_intention_trunk()

@@ -49,6 +49,7 @@ class LfgpConfig:
   value_penalty: float = 0.0  # lambda of values out of bounds (later work: 10)
   value_penalty_window: int = 50  # updates that the bounds' medians run over
   freeze_updates: int = 0  # first updates, with the intentions' trunk frozen
+  intention_delay: int = 0  # first updates, of critics and discriminators alone
 
   # Rewards.
   reward_source: str = "discriminator"  # or "replay", "examples"
@@ -85,8 +86,10 @@ class LfgpConfig:
   bc_weight: float = 0.0  # BC term in the intentions' loss
   bc_normalise: bool = False  # times each task's mean |Q|
   bc_decay: float = 1.0  # factor on the weight an update
+  prior_weight: float = 0.0  # stay near the first intentions, on all rows
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start
+  cloned_deviation: float = 0.0  # of actions after it; 0: as initialised, 0.7
 
   # Other runs.
   init_from: str = ""  # policy folder whose intentions the actor starts from
@@ -187,7 +190,8 @@ _NUMBERS_ABOVE_0 = (
 )
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
-  "value_penalty example_noise fine_scale"
+  "value_penalty example_noise fine_scale prior_weight "
+  "cloned_deviation"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "
@@ -201,7 +205,7 @@ _SWITCHES = (
 _RANGES = {
   "an integer above 0": _INTEGERS_ABOVE_0,
   "an integer, 0 or more": "random_steps bc_warm_start_updates "
-  "freeze_updates transfer_updates",
+  "freeze_updates intention_delay transfer_updates",
   "a number above 0": _NUMBERS_ABOVE_0,
   "a number, 0 or more": _NUMBERS_FROM_0,
   "a number": "target_entropy",

@@ -21,6 +21,7 @@ from agents.losses.critic import (
 from agents.losses.intention import intention_loss
 from agents.losses.temperature import temperature_loss
 from agents.networks import tanh_gaussian
+from agents.networks.intentions import IntentionNetwork
 from agents.optimisation import (
   clipped_step,
   frozen,
@@ -117,9 +118,9 @@ class LfgpLearner:
     is_frozen = self.updates < self._config.freeze_updates
     with frozen(list(trunk.parameters()) if is_frozen else []):
       metrics |= self.update_critics(batch, self._rewards_of(batch))
-      log_prob, policy_metrics = self.update_intentions(inputs, expert)
-    metrics |= policy_metrics
-    metrics |= self._update_temperatures(log_prob)
+      if self.updates >= self._config.intention_delay:
+        log_prob, more = self.update_intentions(inputs, expert)
+        metrics |= more | self._update_temperatures(log_prob)
     polyak(
       self.networks.target_critics, self.networks.critics, self._config.polyak
     )
@@ -236,6 +237,10 @@ class LfgpLearner:
       term, more = self._cloning_term(expert, q.detach())
       loss = loss + term
       metrics |= more
+    if networks.prior is not None:
+      term, more = self._prior_term(networks.prior, inputs, mean, q.detach())
+      loss = loss + term
+      metrics |= more
     norm = self._step("policy", loss, self._policy_parameters)
     saturated = (action.detach().abs() > _SATURATED).float()
     return log_prob.detach(), metrics | {
@@ -249,12 +254,34 @@ class LfgpLearner:
     """The BC term: every task weighs bc_weight, times its mean |Q| if asked."""
     config = self._config
     mean, _ = self.networks.intentions(expert.inputs.to(self._dtype))
-    weight = torch.full_like(
-      q[0, :, 0], config.bc_weight * config.bc_decay**self.updates
+    return behaviour_cloning_loss(
+      mean, expert.action, self._weight(config.bc_weight, q)
+    )
+
+  def _prior_term(
+    self,
+    prior: IntentionNetwork,
+    inputs: torch.Tensor,
+    mean: torch.Tensor,
+    q: torch.Tensor,
+  ) -> tuple[torch.Tensor, Metrics]:
+    """The same on the batch's rows, towards the intentions of the start."""
+    with torch.no_grad():
+      wanted = torch.tanh(prior(inputs)[0])
+    loss, more = behaviour_cloning_loss(
+      mean, wanted, self._weight(self._config.prior_weight, q)
+    )
+    return loss, {"distance_from_prior": more["behaviour_cloning"]}
+
+  def _weight(self, weight: float, q: torch.Tensor) -> torch.Tensor:
+    """A term's weight in each task, [K], faded and normalised if asked."""
+    config = self._config
+    weights = torch.full_like(
+      q[0, :, 0], weight * config.bc_decay**self.updates
     )
     if config.bc_normalise:
-      weight = weight * torch.minimum(q[0], q[1]).abs().mean(-1)
-    return behaviour_cloning_loss(mean, expert.action, weight)
+      weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
+    return weights
 
   def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
     parameter = self.networks.log_temperature
@@ -296,6 +323,12 @@ class LfgpLearner:
     state = self.networks.intentions.trunk.state_dict()
     self.networks.critics.trunk.load_state_dict(state)
     self.networks.target_critics.trunk.load_state_dict(state)
+
+  def adopt_prior(self) -> None:
+    """Makes the present intentions those to stay near, if it is asked."""
+    if self.networks.prior is not None:
+      state = self.networks.intentions.state_dict()
+      self.networks.prior.load_state_dict(state)
 
   def state_dict(self) -> dict[str, Any]:
     """Networks, optimisers, noise and the count of updates."""

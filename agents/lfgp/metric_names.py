@@ -29,4 +29,5 @@ TASK_METRICS = (
   "entropy",
   "saturation",  # share of the intention's action floats beyond 0.99
   "behaviour_cloning",
+  "distance_from_prior",  # squared, of the mean actions
 )

@@ -23,6 +23,7 @@ class LfgpNetworks:
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
   discriminator: Discriminator | None  # None: rewards come from elsewhere
   log_temperature: nn.Parameter  # [K]
+  prior: IntentionNetwork | None = None  # the first intentions, frozen
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
@@ -33,6 +34,8 @@ class LfgpNetworks:
     }
     if self.discriminator is not None:
       modules["discriminator"] = self.discriminator
+    if self.prior is not None:
+      modules["prior"] = self.prior
     return modules
 
 
@@ -86,6 +89,9 @@ def make_networks(
       generator,
       config.discriminator_input,
     ).to(device)
+  prior = None
+  if config.prior_weight:
+    prior = copy.deepcopy(intentions).requires_grad_(False)
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,
@@ -93,4 +99,5 @@ def make_networks(
     target_critics=copy.deepcopy(critics).requires_grad_(False),
     discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
+    prior=prior,
   )

@@ -1,5 +1,7 @@
 """The intentions: a trunk and one policy head a task (low-level policies)."""
 
+import math
+
 import torch
 from torch import nn
 from torch.nn import functional
@@ -54,6 +56,18 @@ class IntentionHeads(nn.Module):
     if self.second is not None:
       hidden = self.second(hidden).relu_()
     return split(self.output(hidden))
+
+  def set_deviation(self, deviation: float) -> None:
+    """Gives all intentions one standard deviation (before the tanh) at first.
+
+    Args:
+      deviation: above 0.
+    """
+    actions = self.output.weight.shape[-1] // 2
+    raw = math.log(math.expm1(deviation))  # softplus(raw) = deviation
+    with torch.no_grad():
+      self.output.weight[..., actions:] = 0.0
+      self.output.bias[..., actions:] = raw
 
   def one(
     self, features: torch.Tensor, task: int

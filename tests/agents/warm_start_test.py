@@ -83,6 +83,55 @@ class FreezeTest(parameterized.TestCase):
     torch.testing.assert_close(_states(networks.critics.trunk), cloned)
 
 
+class CautiousStartTest(absltest.TestCase):
+  def test_intentions_and_temperatures_wait_for_the_critics(self):
+    agent = _build(intention_delay=2, intention_learning_rate=1e-3)
+    networks = agent.learner.networks
+    heads, critics = (
+      _states(networks.intentions.heads),
+      _states(networks.critics),
+    )
+    for _ in range(2):
+      agent.update()
+    torch.testing.assert_close(
+      _states(networks.intentions.heads), heads, rtol=0, atol=0
+    )
+    self.assertEqual(networks.log_temperature.tolist(), [0.0] * len(TASKS))
+    moved = networks.critics.state_dict()
+    self.assertFalse(torch.equal(moved["heads.bias"], critics["heads.bias"]))
+    agent.update()
+    moved = networks.intentions.heads.state_dict()
+    self.assertFalse(torch.equal(moved["output.bias"], heads["output.bias"]))
+    self.assertNotEqual(networks.log_temperature[0].item(), 0.0)
+
+  def test_cloned_intentions_get_the_deviation_that_is_asked(self):
+    agent = _build(bc_warm_start_updates=1, cloned_deviation=0.1)
+    agent.prepare()
+    rows = torch.randn(7, OBS)
+    _, deviation = agent.learner.networks.intentions(rows)
+    torch.testing.assert_close(deviation, torch.full_like(deviation, 0.1))
+
+  def test_a_prior_keeps_intentions_near_their_start_on_replayed_rows(self):
+    distances = []
+    for weight in (1e-6, 100.0):
+      agent = _build(
+        actor_trunk="own",
+        prior_weight=weight,
+        bc_warm_start_updates=5,
+        intention_learning_rate=1e-2,
+      )
+      agent.prepare()
+      rows = torch.from_numpy(synthetic.transitions(50, OBS, A).observation)
+      start = agent.learner.networks.intentions(rows)[0].tanh()
+      for _ in range(50):
+        agent.update()
+      now = agent.learner.networks.intentions(rows)[0].tanh()
+      distances.append((now - start).square().sum(-1).mean().item())
+      state = agent.state_dict()["learner"]["networks"]["prior"]
+      self.assertIn("trunk.first.weight", state)  # a resume needs it
+    self.assertLess(distances[1], 0.2 * distances[0])
+
+
 class InitFromTest(parameterized.TestCase):
   @parameterized.parameters("shared_trunk", "separate")
   def test_intentions_of_common_tasks_act_like_the_policy(self, layout):
