@@ -85,7 +85,14 @@ class LearningTest(absltest.TestCase):
         late[f"logit_expert/{task}"], late[f"logit_policy/{task}"]
       )
     self.assertLess(late["loss/discriminator"], early["loss/discriminator"])
-    off = ("scheduler/", "loss/behaviour", "behaviour", "loss/value", "value_")
+    off = (
+      "scheduler/",
+      "loss/behaviour",
+      "behaviour",
+      "loss/value",
+      "value_",
+      "distance",
+    )
     for name, value in late.items():
       if not name.startswith(off):
         self.assertTrue(math.isfinite(value), name)
