@@ -17,6 +17,7 @@ def load(
   spawn: str = "published",
   control_hz: int = 20,
   time_limit: float = 18.0,
+  **unknown: object,
 ) -> PlayEnvironment:
   """Makes the environment of a task.
 
@@ -30,6 +31,7 @@ def load(
     spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
     control_hz: 20, 10 or 5 control steps a second.
     time_limit: length of an episode, s.
+    **unknown: refused, with the options that there are.
 
   Returns:
     A `composer.Environment`.
@@ -38,6 +40,10 @@ def load(
     ValueError: an unknown name or a value out of range, with the valid ones.
   """
   check_task(task)
+  if unknown:
+    raise ValueError(
+      f"unknown option {', '.join(unknown)}; valid: {', '.join(_OPTIONS)}"
+    )
   _check("reward", reward, REWARDS)
   _check("observations", observations, OBSERVATIONS)
   _check("spawn", spawn, SPAWNS)
@@ -48,6 +54,9 @@ def load(
     )
   play = PlayTask(task, reward, observations, spawn, control_hz)
   return PlayEnvironment(play, seed, time_limit)
+
+
+_OPTIONS = tuple(load.__kwdefaults__)
 
 
 def _check(name: str, value, valid) -> None:

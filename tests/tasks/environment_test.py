@@ -166,6 +166,7 @@ class EnvironmentTest(parameterized.TestCase):
     ("stack", {"spawn": "table"}, "published, full_tray"),
     ("stack", {"control_hz": 7}, "20, 10, 5"),
     ("stack", {"time_limit": 0.0}, "time_limit"),
+    ("stack", {"colour": 1}, "unknown option colour; valid: reward, obs"),
   )
   def test_unknown_names_list_the_valid_ones(self, task, options, message):
     with self.assertRaisesRegex(ValueError, message):
