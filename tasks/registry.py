@@ -56,7 +56,7 @@ def load(
   return PlayEnvironment(play, seed, time_limit)
 
 
-_OPTIONS = tuple(load.__kwdefaults__)
+_OPTIONS = tuple(load.__kwdefaults__ or ())
 
 
 def _check(name: str, value, valid) -> None:
