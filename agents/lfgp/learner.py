@@ -9,10 +9,10 @@ from torch import nn
 
 from agents import serialisation
 from agents.experts import Batch, ExpertBatch
+from agents.lfgp.cloning_terms import CloningTerms
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.discriminating import DiscriminatorLearner
 from agents.lfgp.networks import LfgpNetworks
-from agents.losses.behaviour_cloning import behaviour_cloning_loss
 from agents.losses.critic import (
   critic_loss,
   soft_bellman_target,
@@ -21,7 +21,6 @@ from agents.losses.critic import (
 from agents.losses.intention import intention_loss
 from agents.losses.temperature import temperature_loss
 from agents.networks import tanh_gaussian
-from agents.networks.intentions import IntentionNetwork
 from agents.optimisation import (
   clipped_step,
   frozen,
@@ -79,6 +78,7 @@ class LfgpLearner:
         config, networks.discriminator, generator
       )
       self._optimisers["discriminator"] = self._discriminator.optimiser
+    self._cloning_terms = CloningTerms(config, networks)
     self._bounds = ValueBounds(
       len(networks.log_temperature),
       config.value_penalty_window,
@@ -220,7 +220,7 @@ class LfgpLearner:
     self, inputs: torch.Tensor, expert: ExpertBatch | None
   ) -> tuple[torch.Tensor, Metrics]:
     """Returns the new actions' log densities [K, B], and metrics."""
-    networks, config = self.networks, self._config
+    networks = self.networks
     inputs = inputs.to(self._dtype)
     with frozen(self._critic_parameters):
       critic_features = networks.critics.trunk(inputs)
@@ -233,55 +233,14 @@ class LfgpLearner:
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
-    if expert is not None and config.bc_weight > 0:
-      term, more = self._cloning_term(expert, q.detach())
-      loss = loss + term
-      metrics |= more
-    if networks.prior is not None:
-      term, more = self._prior_term(networks.prior, inputs, mean, q.detach())
-      loss = loss + term
-      metrics |= more
+    terms, more = self._cloning_terms(expert, inputs, mean, q, self.updates)
+    loss, metrics = loss + terms, metrics | more
     norm = self._step("policy", loss, self._policy_parameters)
     saturated = (action.detach().abs() > _SATURATED).float()
     return log_prob.detach(), metrics | {
       "gradient_norm/policy": norm,
       "saturation": saturated.mean((1, 2)),
     }
-
-  def _cloning_term(
-    self, expert: ExpertBatch, q: torch.Tensor
-  ) -> tuple[torch.Tensor, Metrics]:
-    """The BC term: every task weighs bc_weight, times its mean |Q| if asked."""
-    config = self._config
-    mean, _ = self.networks.intentions(expert.inputs.to(self._dtype))
-    return behaviour_cloning_loss(
-      mean, expert.action, self._weight(config.bc_weight, q)
-    )
-
-  def _prior_term(
-    self,
-    prior: IntentionNetwork,
-    inputs: torch.Tensor,
-    mean: torch.Tensor,
-    q: torch.Tensor,
-  ) -> tuple[torch.Tensor, Metrics]:
-    """The same on the batch's rows, towards the intentions of the start."""
-    with torch.no_grad():
-      wanted = torch.tanh(prior(inputs)[0])
-    loss, more = behaviour_cloning_loss(
-      mean, wanted, self._weight(self._config.prior_weight, q)
-    )
-    return loss, {"distance_from_prior": more["behaviour_cloning"]}
-
-  def _weight(self, weight: float, q: torch.Tensor) -> torch.Tensor:
-    """A term's weight in each task, [K], faded and normalised if asked."""
-    config = self._config
-    weights = torch.full_like(
-      q[0, :, 0], weight * config.bc_decay**self.updates
-    )
-    if config.bc_normalise:
-      weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
-    return weights
 
   def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
     parameter = self.networks.log_temperature

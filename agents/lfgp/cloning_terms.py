@@ -1,0 +1,70 @@
+"""Terms in the intentions' loss that hold them to what was shown or cloned."""
+
+import torch
+
+from agents.experts import ExpertBatch
+from agents.lfgp.config import LfgpConfig
+from agents.lfgp.networks import LfgpNetworks
+from agents.losses.behaviour_cloning import behaviour_cloning_loss
+
+Metrics = dict[str, torch.Tensor]
+
+
+class CloningTerms:
+  """The BC term, on expert rows, and the prior's, on the replay's rows.
+
+  A term's weight fades by `bc_decay` an update and, with `bc_normalise`, is
+  counted in each task's mean |Q|, with which the rest of the loss grows.
+  """
+
+  def __init__(self, config: LfgpConfig, networks: LfgpNetworks):
+    """Keeps what is needed."""
+    self._config = config
+    self._networks = networks
+
+  def __call__(
+    self,
+    expert: ExpertBatch | None,
+    inputs: torch.Tensor,
+    mean: torch.Tensor,
+    q: torch.Tensor,
+    updates: int,
+  ) -> tuple[torch.Tensor | float, Metrics]:
+    """Adds up the terms that the config asks for.
+
+    Args:
+      expert: each task's own pairs; None: no BC term.
+      inputs: [B, O], the replay's rows, in the products' dtype.
+      mean: [K, B, A], the intentions' means there, before the tanh.
+      q: [2, K, B], the critics' values there; no gradient goes into them.
+      updates: how many were made before.
+
+    Returns:
+      Their sum, 0.0 if there is none, and metrics by task.
+    """
+    config = self._config
+    loss: torch.Tensor | float = 0.0
+    metrics: Metrics = {}
+    if expert is not None and config.bc_weight > 0:
+      shown, _ = self._networks.intentions(expert.inputs.to(inputs.dtype))
+      weight = self._weight(config.bc_weight, q, updates)
+      term, more = behaviour_cloning_loss(shown, expert.action, weight)
+      loss, metrics = loss + term, more
+    if self._networks.prior is not None:
+      with torch.no_grad():
+        wanted = torch.tanh(self._networks.prior(inputs)[0])
+      weight = self._weight(config.prior_weight, q, updates)
+      term, more = behaviour_cloning_loss(mean, wanted, weight)
+      loss = loss + term
+      metrics["distance_from_prior"] = more["behaviour_cloning"]
+    return loss, metrics
+
+  def _weight(
+    self, weight: float, q: torch.Tensor, updates: int
+  ) -> torch.Tensor:
+    """A term's weight in each task, [K]."""
+    config, q = self._config, q.detach()
+    weights = torch.full_like(q[0, :, 0], weight * config.bc_decay**updates)
+    if config.bc_normalise:
+      weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
+    return weights
