@@ -17,6 +17,7 @@ from lfgp_dmc.replay import Replay
 _ACTION_SIZE = 4
 _CHUNK = 50_000  # rows filled at a time
 _READINGS = 10
+_ASIDE = pathlib.Path("runs")  # git ignores it; a temporary disk may be memory
 
 
 def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
@@ -32,7 +33,8 @@ def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
     after every tenth part of them; `resident_gb`: the most of these.
   """
   torch.set_num_threads(config.threads or 1)
-  with tempfile.TemporaryDirectory(dir=".") as folder:
+  _ASIDE.mkdir(exist_ok=True)
+  with tempfile.TemporaryDirectory(dir=_ASIDE) as folder:
     replay = Replay(
       config.replay_capacity,
       observations.OBSERVATION_SIZE,
