@@ -65,12 +65,7 @@ def build(
     experts = ExpertPool(demonstrations, tasks, standardiser, device)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
-    config,
-    len(tasks),
-    action_size,
-    standardiser,
-    initial,
-    device,
+    config, len(tasks), action_size, standardiser, initial, device
   )
   noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
   scheduler = make_scheduler(

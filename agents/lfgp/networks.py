@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+from typing import TypeVar
 
 import torch
 from torch import nn
@@ -12,6 +13,8 @@ from agents.networks.critics import CriticNetwork
 from agents.networks.discriminator import Discriminator
 from agents.networks.intentions import IntentionNetwork
 from agents.networks.trunk import Standardiser
+
+_Network = TypeVar("_Network", bound=nn.Module)
 
 
 @dataclasses.dataclass
@@ -89,15 +92,16 @@ def make_networks(
       generator,
       config.discriminator_input,
     ).to(device)
-  prior = None
-  if config.prior_weight:
-    prior = copy.deepcopy(intentions).requires_grad_(False)
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,
     critics=critics,
-    target_critics=copy.deepcopy(critics).requires_grad_(False),
+    target_critics=_frozen_copy(critics),
     discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
-    prior=prior,
+    prior=_frozen_copy(intentions) if config.prior_weight else None,
   )
+
+
+def _frozen_copy(network: _Network) -> _Network:
+  return copy.deepcopy(network).requires_grad_(False)
