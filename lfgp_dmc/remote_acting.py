@@ -8,7 +8,6 @@ process is faster: the same seed gives the same numbers here too.
 
 import contextlib
 import multiprocessing
-import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import NamedTuple
@@ -127,8 +126,7 @@ def _serve(
   pipe: Connection,
 ) -> None:
   """What the actor's process does."""
-  workers.ignore_interrupts()
-  threading.Thread(target=workers.end_with_parent, daemon=True).start()
+  workers.settle_in()
   environment = make_environment()
   flatten = environments.flattener(environment)
   timestep = None

@@ -7,7 +7,6 @@ waits for the slowest there.
 
 import contextlib
 import multiprocessing
-import threading
 from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from typing import Any
@@ -165,8 +164,7 @@ def _record_type(spec: Any) -> np.dtype:
 
 def _serve(factory: Callable[[], dm_env.Environment], pipe: Connection) -> None:
   """What an environment's process does."""
-  workers.ignore_interrupts()
-  threading.Thread(target=workers.end_with_parent, daemon=True).start()
+  workers.settle_in()
   environment = factory()
   spec = environment.observation_spec()
   pipe.send((spec, environment.action_spec()))

@@ -77,8 +77,7 @@ _state: Callable[[Any], Any] | None = None  # one in each worker process
 
 def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
   global _state
-  ignore_interrupts()
-  threading.Thread(target=end_with_parent, daemon=True).start()
+  settle_in()
   _state = make_state()
 
 
@@ -87,13 +86,17 @@ def _work(job: Any) -> Any:
   return _state(job)
 
 
-def ignore_interrupts() -> None:
-  """Leaves Ctrl-C, which goes to every process, to the parent."""
+def settle_in() -> None:
+  """What each process of ours does first.
+
+  Ctrl-C, which goes to every process, is left to the parent; and when that is
+  gone, however it was killed, the process ends.
+  """
   signal.signal(signal.SIGINT, signal.SIG_IGN)
+  threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
-def end_with_parent() -> None:
-  """Ends this process when its parent is gone, however that was killed."""
+def _end_with_parent() -> None:
   parent = multiprocessing.parent_process()
   assert parent is not None
   parent.join()
