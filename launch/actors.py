@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 import lfgp_dmc
-from launch import worlds
 from launch.command import UserError
+from launch.worlds import World
 from lfgp_dmc import run_folder
 from lfgp_dmc.types import Actor
 
@@ -29,19 +29,23 @@ class Cast:
 
   make: Callable[[], Actor]  # picklable
   name: str  # for tables and sidecars
-  main_task: str  # whose environment
+  world: World
   tasks: tuple[str, ...]  # what it can do, the main task first
-  environment: str = ""  # see `worlds.factory`
   folder: pathlib.Path | None = None  # of a run
   config: dict[str, Any] = dataclasses.field(default_factory=dict)
   env_step: int = 0  # how long it was trained
 
+  @property
+  def main_task(self) -> str:
+    """The task whose environment it is at home in."""
+    return self.world.main_task
 
-def scripted_expert() -> Actor:
+
+def scripted_expert(control_hz: int = 20) -> Actor:
   """Makes the scripted expert of all nine tasks."""
   from tasks import experts
 
-  return experts.make_expert()
+  return experts.make_expert(control_hz=control_hz)
 
 
 def stored_policy(folder: str) -> Actor:
@@ -68,13 +72,14 @@ def sampling_policy(
   return policy
 
 
-def find(run: str, expert: str, task: str = "") -> Cast:
+def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
   """The actor that `--run` or `--expert` names.
 
   Args:
     run: a run or policy folder, or "".
     expert: "scripted", a run folder, or "".
     task: for the scripted expert, the task whose environment is loaded.
+    control_hz: likewise, its control steps a second.
 
   Raises:
     UserError: none or both are given, or the folder holds no policy.
@@ -84,7 +89,8 @@ def find(run: str, expert: str, task: str = "") -> Cast:
   if expert == SCRIPTED:
     task = task or lfgp_dmc.MAIN_TASKS[0]
     tasks = (task, *(t for t in lfgp_dmc.ALL_TASKS if t != task))
-    return Cast(scripted_expert, "scripted expert", task, tasks)
+    make = functools.partial(scripted_expert, control_hz)
+    return Cast(make, "scripted expert", World(task, "", control_hz), tasks)
   return _of_folder(run or expert)
 
 
@@ -96,16 +102,17 @@ def _of_folder(folder: str) -> Cast:
       raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
     policy: Any = stored_policy(folder)
     main_task = config.get("main_task", policy.tasks[0])
-    environment = config.get("environment", "")
-    worlds.check(environment, main_task)
+    world = World(
+      main_task, config.get("environment", ""), config.get("control_hz", 20)
+    )
+    world.check()
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
   return Cast(
     functools.partial(stored_policy, os.fspath(path)),
     path.name,
-    main_task,
+    world,
     (main_task, *(t for t in policy.tasks if t != main_task)),
-    environment,
     path,
     config,
     int(config.get("policy", {}).get("env_step", 0)),

@@ -14,6 +14,7 @@ import lfgp_dmc
 from launch import actors, command
 from lfgp_dmc import collection, demonstrations
 from lfgp_dmc.collection_attempts import Plan
+from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
 
 _TASK = flags.DEFINE_string(
@@ -39,12 +40,14 @@ _WORKERS = flags.DEFINE_integer(
   "workers", 0, "Processes; 0: one a core. The data are the same."
 )
 
-_CONTROL_HZ = 20  # what `lfgp_dmc.load` builds
+_HERTZ = flags.DEFINE_integer(
+  "control_hz", 20, "Control steps a second: 20, 10 or 5."
+)
 
 
-def load(task: str):
+def load(control_hz: int, task: str):
   """Builds the environment of a task; importable by workers."""
-  return lfgp_dmc.load(task)
+  return lfgp_dmc.load(task, control_hz=control_hz)
 
 
 def sampling_actor(make_policy) -> Actor:
@@ -57,18 +60,30 @@ def sampling_actor(make_policy) -> Actor:
 def main() -> int:
   """Collects, writes and tells what it wrote."""
   output, tasks = _check_flags()
-  cast = actors.find("", _EXPERT.value, _TASK.value)
+  cast = actors.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
   make_actor = cast.make
   if _EXPERT.value != actors.SCRIPTED:
     make_actor = functools.partial(sampling_actor, cast.make)
   all_tasks = lfgp_dmc.task_set(_TASK.value)
+  if cast.world.control_hz != _HERTZ.value:
+    raise command.UserError(
+      f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
+      f"{cast.world.control_hz} Hz"
+    )
   lacking = [task for task in all_tasks if task not in cast.tasks]
   if lacking:
     raise command.UserError(
       f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
       f"--task={_TASK.value}; it can do: {', '.join(cast.tasks)}"
     )
-  plan = Plan(load, make_actor, _TASK.value, all_tasks, _SEED.value)
+  plan = Plan(
+    functools.partial(load, _HERTZ.value),
+    make_actor,
+    _TASK.value,
+    all_tasks,
+    _SEED.value,
+    _HERTZ.value,
+  )
   try:
     found = collection.collect(
       plan,
@@ -95,6 +110,7 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   """The output folder and the tasks to collect."""
   command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
   command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
+  command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
   command.check_least("final_pairs", _FINALS.value, 0)
   command.check_least("seed", _SEED.value, 0)
@@ -136,7 +152,7 @@ def _write(
         "collection": _COLLECTION.value,
         "expert": _EXPERT.value,
         "seed": _SEED.value,
-        "control_hz": _CONTROL_HZ,
+        "control_hz": _HERTZ.value,
       }
       path = folder / (task + demonstrations.SUFFIX)
       demonstrations.write(path, data, attributes)

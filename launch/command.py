@@ -5,11 +5,14 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from typing import TypeVar
 
 from absl import app, flags
 from absl import logging as absl_logging
 
 from lfgp_dmc import graphics
+
+_T = TypeVar("_T", str, int)
 
 INTERRUPTED = 130  # exit status after SIGINT or SIGTERM
 
@@ -88,10 +91,11 @@ def cores() -> int:
   return os.cpu_count() or 1
 
 
-def check_choice(flag: str, value: str, valid: Sequence[str]) -> str:
+def check_choice(flag: str, value: _T, valid: Sequence[_T]) -> _T:
   """Returns `value`; raises UserError that lists the valid ones."""
   if value not in valid:
-    raise UserError(f"--{flag}={value} is unknown; valid: {', '.join(valid)}")
+    names = ", ".join(map(str, valid))
+    raise UserError(f"--{flag}={value} is unknown; valid: {names}")
   return value
 
 

@@ -36,6 +36,7 @@ def load(
     collect_if_asked(config)
   try:
     found = _read(folder, tasks, widths)
+    _check_rate(config, found)
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
     raise UserError(f"{error}{hint}") from None
@@ -65,6 +66,20 @@ def _read(
   return demonstrations.read_folder(folder, tasks, *widths)
 
 
+def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
+  """Raises ValueError if block tasks were shown at another control rate."""
+  wrong = [
+    f"{task} ({data.attributes['control_hz']})"
+    for task, data in found.items()
+    if data.attributes.get("control_hz", config.control_hz) != config.control_hz
+  ]
+  if wrong and not config.environment:
+    raise ValueError(
+      f"config.control_hz is {config.control_hz}; {config.demonstrations} "
+      f"shows another rate: {', '.join(wrong)}"
+    )
+
+
 def collect_if_asked(config: RunConfig) -> None:
   """Collects the dataset if `config.collect_pairs` says so.
 
@@ -88,9 +103,12 @@ def pairs(found: dict[str, Demonstrations]) -> str:
 
 def _command(config: RunConfig, pairs_per_task: str) -> str:
   is_multitask = ALGORITHMS[config.algorithm].is_multitask
+  rate = f"--control_hz={config.control_hz} "
+  if config.control_hz == RunConfig.control_hz:
+    rate = ""
   own = "" if is_multitask else f"--tasks={config.main_task} "
   return (
     f"python launch/collect_demonstrations.py --task={config.main_task} {own}"
-    f"--pairs_per_task={pairs_per_task} --seed={config.seed} "
+    f"--pairs_per_task={pairs_per_task} --seed={config.seed} {rate}"
     f"--output={config.demonstrations}"
   )

@@ -18,7 +18,7 @@ import dm_env
 import numpy as np
 from absl import flags
 
-from launch import actors, clips, command, config_flags, training, worlds
+from launch import actors, clips, command, config_flags, training
 from launch.configs import RunConfig
 from lfgp_dmc import (
   evaluation,
@@ -116,7 +116,7 @@ def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
 
 def _evaluate(config: RunConfig, make_actor) -> list[EvaluationRow]:
   return evaluation.evaluate(
-    worlds.factory(config.environment, config.main_task, True),
+    config.world.factory(show_rewards=True),
     make_actor,
     task_names.task_set(config.main_task),
     config.evaluation_episodes,
@@ -135,7 +135,7 @@ def _film(
   if graphics.fault():
     return None
   chosen = choose_episodes(config.main_task, trained)
-  environment = worlds.build(config.environment, config.main_task)
+  environment = config.world.build()
   actor = actors.stored_policy(str(path))
   frames: list[np.ndarray] = []
   for row in chosen:

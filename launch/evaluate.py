@@ -13,9 +13,10 @@ from collections.abc import Sequence
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, command, worlds
+from launch import actors, command
 from launch.command import UserError
 from lfgp_dmc import evaluation
+from lfgp_dmc.task_names import CONTROL_RATES
 
 _NAME = "evaluation.csv"
 
@@ -34,6 +35,9 @@ _MAIN_TASK = flags.DEFINE_string(
   "",
   "With --expert: whose environment; default: each task in its own.",
 )
+_HERTZ = flags.DEFINE_integer(
+  "control_hz", 20, "With --expert: 20, 10 or 5 control steps a second."
+)
 _OUTPUT = flags.DEFINE_string(
   "output",
   "",
@@ -47,11 +51,12 @@ def main() -> None:
   command.check_least("episodes", _EPISODES.value, 1)
   command.check_least("seed", _SEED.value, 0)
   command.check_least("workers", _WORKERS.value, 0)
+  command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
   rows: list[evaluation.EvaluationRow] = []
   for cast, tasks in _plan():
     rows += evaluation.evaluate(
-      worlds.factory(cast.environment, cast.main_task, True),
+      cast.world.factory(show_rewards=True),
       cast.make,
       tasks,
       _EPISODES.value,
@@ -79,8 +84,12 @@ def _plan() -> list[tuple[actors.Cast, tuple[str, ...]]]:
     _TASKS.value, lfgp_dmc.task_set(own) if own else lfgp_dmc.ALL_TASKS, default
   )
   if own:
-    return [(actors.find("", actors.SCRIPTED, own), tasks)]
-  return [(actors.find("", actors.SCRIPTED, task), (task,)) for task in tasks]
+    return [(_scripted(own), tasks)]
+  return [(_scripted(task), (task,)) for task in tasks]
+
+
+def _scripted(task: str) -> actors.Cast:
+  return actors.find("", actors.SCRIPTED, task, _HERTZ.value)
 
 
 def choose_tasks(

@@ -24,14 +24,19 @@ import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, clips, command, playing, strips, worlds
+from launch import actors, clips, command, playing, strips
 from launch.command import UserError
+from launch.worlds import World
 from lfgp_dmc import graphics, seeding, video
+from lfgp_dmc.task_names import CONTROL_RATES
 
 _RUN = flags.DEFINE_string(
   "run", "", "A run's folder, or a policy folder; several for strips."
 )
 _EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_HERTZ = flags.DEFINE_integer(
+  "control_hz", 20, "With --expert: 20, 10 or 5 control steps a second."
+)
 _WHAT = flags.DEFINE_enum(
   "what", "episode", ["episode", "strips", "reset"], "What is shown."
 )
@@ -78,13 +83,13 @@ _UNTIL = flags.DEFINE_bool(
   "until_success", False, "Stop a second after the task's success."
 )
 
-_RATE = 20.0  # control steps a second
 _MOST_CELLS = 100
 
 
 def main() -> None:
   """Plays, renders and writes."""
   rows, columns = _grid()
+  command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   task = _TASK.value
   if task and (_EXPERT.value or _WHAT.value == "reset"):
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
@@ -103,12 +108,12 @@ def main() -> None:
 def _film(task: str, rows: int, columns: int) -> None:
   """An episode, or a grid of them."""
   is_play = _COLLECTION.value == "play"
-  cast = actors.find(_RUN.value, _EXPERT.value, task)
+  cast = actors.find(_RUN.value, _EXPERT.value, task, _HERTZ.value)
   task = task or cast.main_task
   if task != playing.SCHEDULED:
     command.check_choice("task", task, (*cast.tasks, playing.SCHEDULED))
   output = _checked_output(f"{cast.name}_{'play' if is_play else task}")
-  world = _checked_world(cast.environment, cast.main_task)
+  world = _checked_world(cast.world)
   played = [
     strips.play(
       cast,
@@ -138,7 +143,7 @@ def _film(task: str, rows: int, columns: int) -> None:
   frames = video.grid([clip.frames for clip in played], columns)
   if output.suffix == ".png":
     frames = video.film_strip(frames, _STRIP.value if len(played) == 1 else 1)
-  video.write(output, frames, _RATE / _EVERY.value, metadata)
+  video.write(output, frames, cast.world.control_hz / _EVERY.value, metadata)
   for clip in played:
     done = ", ".join(f"{k} at step {v}" for k, v in clip.first_success.items())
     print(f"successes: {done or 'none'}")
@@ -155,7 +160,7 @@ def _film_strips() -> None:
     casts = [actors.find(run, "") for run in _RUN.value.split(",")]
   output = _checked_output("strips", (".png",))
   for cast in casts:
-    _checked_world(cast.environment, cast.main_task).close()
+    _checked_world(cast.world).close()
   look = clips.Look(
     _HEIGHT.value,
     _WIDTH.value,
@@ -173,7 +178,7 @@ def _film_strips() -> None:
 def _picture_of_reset(task: str, rows: int, columns: int) -> None:
   """The world after resets, before anybody acts."""
   output = _checked_output(f"reset_{task}", (".png",))
-  environment = _checked_world("", task)
+  environment = _checked_world(World(task))
   look = _look(rows, columns)
   clips.prepare(environment, look)
   pictures = []
@@ -215,14 +220,14 @@ def _grid() -> tuple[int, int]:
   return int(match[1]), int(match[2])
 
 
-def _checked_world(environment: str, main_task: str):
+def _checked_world(world: World):
   """The environment, if it can be drawn by the camera asked for."""
   fault = graphics.fault()
   if fault:
     raise UserError(fault)
-  world = worlds.build(environment, main_task)
-  command.check_choice("camera", _CAMERA.value, playing.cameras(world))
-  return world
+  environment = world.build()
+  command.check_choice("camera", _CAMERA.value, playing.cameras(environment))
+  return environment
 
 
 def _checked_output(

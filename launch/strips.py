@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from absl import logging
 
-from launch import actors, clips, playing, worlds
+from launch import actors, clips, playing
 from launch.clips import Clip, Look
 from launch.command import UserError
 from lfgp_dmc import seeding, video
@@ -40,7 +40,7 @@ def play(
     world = environment
     world.reseed(derived)
   else:
-    world = worlds.build(cast.environment, cast.main_task, seed=derived)
+    world = cast.world.build(seed=derived)
   if task == playing.SCHEDULED:
     look = dataclasses.replace(look, scheduled_for=cast.main_task)
   try:
@@ -88,7 +88,7 @@ def rows(
   shown: list[dict[str, int | str]] = []
   for cast in casts:
     task = cast.main_task
-    world = worlds.build(cast.environment, task)
+    world = cast.world.build()
     found = _success(cast, task, range(seed, seed + attempts), look, world)
     steps = np.linspace(0, found[1], columns).round().astype(int)
     clip = play(

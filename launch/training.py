@@ -4,6 +4,7 @@ import functools
 import os
 import pathlib
 import shutil
+from typing import Any
 
 import dm_env
 import safetensors.numpy
@@ -11,7 +12,7 @@ import torch
 
 from launch import actors, command, datasets, starting, worlds
 from launch.command import UserError
-from launch.configs import ALGORITHMS, RunConfig
+from launch.configs import ALGORITHMS, RunConfig, from_dict
 from lfgp_dmc import (
   environments,
   evaluation,
@@ -66,8 +67,10 @@ def train(
   if shown:
     print(f"demonstrations: {config.demonstrations}, {datasets.pairs(shown)}")
   with command.checked_input():
-    open_folder = run_folder.resume if resume else run_folder.create
-    folder = open_folder(path, config.to_dict())
+    if resume:
+      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
+    else:
+      folder = run_folder.create(path, config.to_dict())
   try:
     run = _Run(config, folder, environment, tasks, shown, device)
     if resume:
@@ -126,7 +129,7 @@ def evaluate_policy(
 ) -> list[evaluation.EvaluationRow]:
   """Plays the stored policy: every task, the config's episodes and seed."""
   return evaluation.evaluate(
-    worlds.factory(config.environment, config.main_task, True),
+    config.world.factory(show_rewards=True),
     functools.partial(actors.stored_policy, os.fspath(folder)),
     tasks,
     config.evaluation_episodes,
@@ -154,6 +157,10 @@ def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
   replay = Replay(1, *widths, reward_tasks=stored)
   agent = _build_agent(config, tasks, shown, replay, device, widths)
   _write_policy(folder, config, agent, env_step=0)
+
+
+def _with_newer_fields(stored: dict[str, Any]) -> dict[str, Any]:
+  return from_dict(stored).to_dict()
 
 
 class _Run:
@@ -232,9 +239,7 @@ class _Run:
   def _make_remote_actor(self, reward_tasks: tuple[str, ...]) -> RemoteActor:
     config = self._config
     return RemoteActor(
-      functools.partial(
-        worlds.build, config.environment, config.main_task, config.keeps_rewards
-      ),
+      config.world.factory(config.keeps_rewards),
       functools.partial(actors.sampling_policy, self._agent.policy_options()),
       reward_tasks,
     )
@@ -276,9 +281,7 @@ def _open_replay(
 
 
 def _build_world(config: RunConfig) -> dm_env.Environment:
-  return worlds.build(
-    config.environment, config.main_task, config.keeps_rewards
-  )
+  return config.world.build(config.keeps_rewards)
 
 
 def _reward_tasks(

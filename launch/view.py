@@ -11,8 +11,9 @@ import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, command, worlds
+from launch import actors, command
 from launch.command import UserError
+from launch.worlds import World
 from lfgp_dmc import environments, graphics
 
 _TASK = flags.DEFINE_string(
@@ -46,10 +47,8 @@ def main() -> None:
 def _open(cast: actors.Cast | None, task: str) -> None:
   from dm_control import viewer
 
-  main_task = cast.main_task if cast else task
-  environment = worlds.build(
-    cast.environment if cast else "", main_task, seed=_SEED.value
-  )
+  world = cast.world if cast else World(task)
+  environment = world.build(seed=_SEED.value)
   policy = None
   if cast:
     actor, flatten = cast.make(), environments.flattener(environment)

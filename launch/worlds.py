@@ -1,5 +1,6 @@
 """Environments by the config's names; importable by worker processes."""
 
+import dataclasses
 import functools
 import importlib
 import inspect
@@ -14,50 +15,58 @@ from lfgp_dmc.task_names import check_task
 _REWARD = "reward/"
 
 
-def factory(
-  environment: str, main_task: str, show_rewards: bool = False
-) -> Callable[..., dm_env.Environment]:
-  """A picklable function that builds an environment, taking `seed=` or not.
+@dataclasses.dataclass(frozen=True)
+class World:
+  """What it takes to build an environment; picklable.
 
-  Args:
-    environment: "" for the block tasks, or `package.module:factory`.
+  Attributes:
     main_task: the task that is loaded.
-    show_rewards: whether each task's dense reward is observed, for returns.
+    environment: "" for the block tasks, or `package.module:factory`.
+    control_hz: control steps a second of the block tasks: 20, 10 or 5.
   """
-  return functools.partial(build, environment, main_task, show_rewards)
 
+  main_task: str
+  environment: str = ""
+  control_hz: int = 20
 
-def build(
-  environment: str,
-  main_task: str,
-  show_rewards: bool = False,
-  seed: int | None = None,
-) -> dm_env.Environment:
-  """Builds an environment; see `factory`.
+  def build(
+    self, show_rewards: bool = False, seed: int | None = None
+  ) -> dm_env.Environment:
+    """Builds it.
 
-  Raises:
-    ValueError: there is no such task or factory; the message says what is.
-  """
-  if environment:
-    make = _imported(environment)
-    if seed is not None and "seed" in inspect.signature(make).parameters:
-      return make(seed=seed)
-    return make()
-  built = lfgp_dmc.load(main_task, seed=seed)
-  if show_rewards:
-    for name, observable in built.task.observables.items():
-      if name.startswith(_REWARD):
-        observable.enabled = True
-    built.reset()  # from here on, its specification tells of them too
-  return built
+    Args:
+      show_rewards: whether each task's dense reward is observed, for returns.
+      seed: of its starts, where it takes one.
 
+    Raises:
+      ValueError: there is no such task, factory or rate; the message says what
+        is.
+    """
+    if self.environment:
+      make = _imported(self.environment)
+      if seed is not None and "seed" in inspect.signature(make).parameters:
+        return make(seed=seed)
+      return make()
+    built = lfgp_dmc.load(self.main_task, seed, control_hz=self.control_hz)
+    if show_rewards:
+      for name, observable in built.task.observables.items():
+        if name.startswith(_REWARD):
+          observable.enabled = True
+      built.reset()  # from here on, its specification tells of them too
+    return built
 
-def check(environment: str, main_task: str) -> None:
-  """Raises ValueError unless `build` would find what it needs."""
-  if environment:
-    _imported(environment)
-  else:
-    check_task(main_task)
+  def factory(
+    self, show_rewards: bool = False
+  ) -> Callable[..., dm_env.Environment]:
+    """A picklable function that builds it, taking `seed=`."""
+    return functools.partial(self.build, show_rewards)
+
+  def check(self) -> None:
+    """Raises ValueError unless `build` would find what it needs."""
+    if self.environment:
+      _imported(self.environment)
+    else:
+      check_task(self.main_task)
 
 
 def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:

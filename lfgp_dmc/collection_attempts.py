@@ -1,5 +1,6 @@
 """Attempts: what an expert does from one start to success or to a limit."""
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -11,7 +12,7 @@ from lfgp_dmc import environments, seeding
 from lfgp_dmc.environments import has_succeeded, is_physics_failure
 from lfgp_dmc.types import Actor
 
-LIMIT = 90  # steps of an attempt (the released code's)
+LIMIT = 90  # steps of an attempt at 20 Hz (the released code's)
 # Unstack-Stack's is the authors' later setting. Ours: Bring's expert may first
 # have to take green out of blue's zone (a quarter of the starts), Insert's to
 # turn blue square and to try again.
@@ -20,6 +21,7 @@ LIMITS = {"unstack_stack": 120, "bring": 150, "insert": 240}
 OPEN, CLOSE, LIFT = "open_gripper", "close_gripper", "lift"
 OPEN_LEAD = 45  # steps of another task before Open-Gripper, not stored
 CLOSE_LEAD = 15  # steps of Lift before Close-Gripper, stored
+PLAY = 360  # steps between resets in play-based collection
 MAIN_LEAD_SHARE = 0.25  # of Open-Gripper's leads that are the main task
 
 
@@ -39,8 +41,9 @@ class Plan:
     main_task: whose T_all it is.
     tasks: T_all, the main task first.
     seed: everything random follows from it.
-    play_steps: steps between resets in play-based collection.
-    limits: task -> most steps of an attempt, where it is not `LIMIT`.
+    control_hz: control steps a second.
+    play_steps: steps at 20 Hz between resets in play-based collection.
+    limits: task -> most steps at 20 Hz of an attempt, where not `LIMIT`.
   """
 
   make_environment: Callable[[str], dm_env.Environment]
@@ -48,8 +51,13 @@ class Plan:
   main_task: str
   tasks: tuple[str, ...]
   seed: int
-  play_steps: int = 360
+  control_hz: int = 20
+  play_steps: int = PLAY
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
+
+  def steps(self, at_20_hz: int) -> int:
+    """The same time in control steps, rounded up."""
+    return math.ceil(at_20_hz * self.control_hz / 20)
 
 
 class Rows(NamedTuple):
@@ -96,7 +104,7 @@ class Collector:
     timestep = self._environment.reset()
     before = _Steps()
     if lead is not None:
-      steps = OPEN_LEAD if task == OPEN else CLOSE_LEAD
+      steps = plan.steps(OPEN_LEAD if task == OPEN else CLOSE_LEAD)
       self._actor.begin(lead, seeding.derive(seed, "lead actor"))
       timestep, _ = self._run(timestep, lead, steps, before, stop=False)
       if timestep.last():
@@ -104,7 +112,7 @@ class Collector:
       self._environment.clear_success()
     stored = before if task == CLOSE else _Steps()
     self._actor.begin(task, seeding.derive(seed, "actor"))
-    limit = plan.limits.get(task, LIMIT)
+    limit = plan.steps(plan.limits.get(task, LIMIT))
     timestep, success = self._run(timestep, task, limit, stored)
     return Attempt(task, stored.rows() if success else None)
 
@@ -137,13 +145,13 @@ class Collector:
     self._environment.reseed(seed)
     timestep = self._environment.reset()
     attempts: list[Attempt] = []
-    left = plan.play_steps
+    left = plan.steps(plan.play_steps)
     while left and not timestep.last():
       task = str(random.choice(plan.tasks))
       self._environment.clear_success()
       self._actor.begin(task, seeding.derive(seed, "actor", len(attempts)))
       steps = _Steps()
-      limit = plan.limits.get(task, LIMIT)
+      limit = plan.steps(plan.limits.get(task, LIMIT))
       timestep, success = self._run(timestep, task, min(limit, left), steps)
       left -= len(steps)
       if success:

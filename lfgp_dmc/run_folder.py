@@ -9,7 +9,7 @@ import datetime
 import fcntl
 import json
 import pathlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from lfgp_dmc import files
@@ -96,12 +96,17 @@ def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
   return run
 
 
-def resume(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
+def resume(
+  path: files.Path,
+  config: Mapping[str, Any],
+  complete: Callable[[dict[str, Any]], dict[str, Any]] = dict,
+) -> RunFolder:
   """Opens an existing run's folder and locks it.
 
   Args:
     path: the run's folder.
     config: the resolved config of the command; it must equal the run's own.
+    complete: gives a stored config the fields that are newer than the run.
 
   Raises:
     RunFolderError: there is no such run, its config differs (the message names
@@ -109,7 +114,7 @@ def resume(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
   """
   path = pathlib.Path(path)
   known = read_config(path)
-  known = {k: v for k, v in known.items() if k not in ADDED_FIELDS}
+  known = complete({k: v for k, v in known.items() if k not in ADDED_FIELDS})
   asked = {k: v for k, v in config.items() if k not in ADDED_FIELDS}
   fields = differing_fields(known, asked)
   if fields:

@@ -14,6 +14,8 @@ AUXILIARY_TASKS = (
 )
 ALL_TASKS = MAIN_TASKS + AUXILIARY_TASKS
 
+CONTROL_RATES = (20, 10, 5)  # Hz: a success check falls every 50 ms
+
 
 def check_task(task: str) -> str:
   """Returns `task` unchanged; raises ValueError if it is not a task."""

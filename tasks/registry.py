@@ -1,11 +1,9 @@
 """Environments by task name."""
 
-from lfgp_dmc.task_names import check_task
+from lfgp_dmc.task_names import CONTROL_RATES, check_task
 from tasks.environment import PlayEnvironment
 from tasks.initialisers import SPAWNS
 from tasks.play import OBSERVATIONS, REWARDS, PlayTask
-
-CONTROL_RATES = (20, 10, 5)  # Hz: a success check falls every 50 ms
 
 
 def load(

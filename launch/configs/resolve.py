@@ -60,8 +60,10 @@ def to_run_config(config: ml_collections.ConfigDict) -> RunConfig:
 def from_dict(values: Mapping[str, Any]) -> RunConfig:
   """Reads a config back from nested values, such as a run's `config.json`.
 
+  A field that is not there, since the run is older than it, has its default.
+
   Raises:
-    ValueError: an unknown or missing field, or a value out of its range.
+    ValueError: an unknown field, or a value out of its range.
   """
   name = values.get("algorithm")
   if name not in ALGORITHMS:
@@ -71,20 +73,18 @@ def from_dict(values: Mapping[str, Any]) -> RunConfig:
   agent_values = values.get("agent")
   if not isinstance(agent_values, Mapping):
     raise ValueError(f"config.agent is {agent_values!r}; valid: its fields")
-  agent_type = ALGORITHMS[name].agent_config
+  algorithm = ALGORITHMS[name]
   _check_fields(RunConfig, values, "config")
-  _check_fields(agent_type, agent_values, "config.agent")
+  _check_fields(algorithm.agent_config, agent_values, "config.agent")
   try:
-    agent = agent_type(**agent_values)
+    agent = algorithm.agent_config(**{**algorithm.defaults, **agent_values})
   except ValueError as error:
     raise ValueError(f"config.agent: {error}") from None
-  return RunConfig(**{**values, "agent": agent})
+  return RunConfig(**{**algorithm.run_defaults, **values, "agent": agent})
 
 
 def _check_fields(kind: type, values: Mapping[str, Any], prefix: str) -> None:
   names = [field.name for field in dataclasses.fields(kind)]
   faults = [f"unknown {prefix}.{name}" for name in values if name not in names]
-  faults += [f"{prefix}.{name} is missing" for name in names
-             if name not in values]  # fmt: skip
   if faults:
-    raise ValueError("; ".join(faults))
+    raise ValueError(f"{'; '.join(faults)}; valid: {', '.join(names)}")

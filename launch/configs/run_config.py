@@ -4,7 +4,8 @@ import dataclasses
 from typing import Any
 
 from launch.configs import algorithms
-from lfgp_dmc.task_names import ALL_TASKS
+from launch.worlds import World
+from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -27,6 +28,7 @@ class RunConfig:
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: str = ""
+  control_hz: int = 20  # of the block tasks: 20, 10 or 5 steps a second
 
   # Another run: its networks, by task name, and its replay are taken over.
   transfer_from: str = ""
@@ -73,8 +75,24 @@ class RunConfig:
       faults.append(
         f"config.main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
       )
+    if self.control_hz not in CONTROL_RATES:
+      faults.append(
+        f"config.control_hz is {self.control_hz!r}; valid: "
+        f"{', '.join(map(str, CONTROL_RATES))}"
+      )
+    steps = getattr(self.agent, "episode_steps", None)
+    if not self.environment and steps not in (None, 18 * self.control_hz):
+      faults.append(
+        f"config.agent.episode_steps is {steps}; valid: "
+        f"{18 * self.control_hz}, 18 s of {self.control_hz} Hz"
+      )
     if faults:
       raise ValueError("\n".join(faults))
+
+  @property
+  def world(self) -> World:
+    """Where the agent acts."""
+    return World(self.main_task, self.environment, self.control_hz)
 
   @property
   def uses_demonstrations(self) -> bool:

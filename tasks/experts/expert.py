@@ -39,11 +39,12 @@ class ScriptedExpert:
 
   tasks = ALL_TASKS
 
-  def __init__(self, noise: float = NOISE):
+  def __init__(self, noise: float = NOISE, control_hz: int = 20):
     """Makes the actor.
 
     Args:
       noise: standard deviation of the action noise; 0 is without.
+      control_hz: control steps a second of the environment.
 
     Raises:
       ValueError: a negative or non-finite `noise`.
@@ -51,6 +52,7 @@ class ScriptedExpert:
     if not 0.0 <= noise < float("inf"):
       raise ValueError(f"noise={noise!r}; valid is 0 or more")
     self._noise = noise
+    self._control_hz = control_hz
     self.begin(ALL_TASKS[0], 0)
 
   def begin(self, task: str, seed: int) -> None:
@@ -68,7 +70,7 @@ class ScriptedExpert:
 
   def act(self, observation: np.ndarray) -> np.ndarray:
     """Maps an observation, float32 [59], to an action, float32 [4]."""
-    command = self._policy(look(observation))
+    command = self._policy(look(observation, self._control_hz))
     move = np.array(command.move)
     busy = min(float(np.abs(move).max()) / _NOISY_FROM, 1.0)
     share = _LEAST_NOISE + (1.0 - _LEAST_NOISE) * busy

@@ -6,10 +6,11 @@ from typing import NamedTuple
 from tasks.experts.view import Vector, View
 
 OPEN, CLOSE = -1, 1
-SPEED = 0.95  # |a| on a long way; 1 cm a step at 1
+SPEED = 0.95  # |a| on a long way; 0.2 m/s at 1
 
-_STEP = 0.01  # m of the set-point at |a| = 1
-_GAIN = 0.4  # share of the remaining way that a step aims to cover
+_FASTEST = 0.2  # m/s of the set-point at |a| = 1
+_GAIN = 0.4  # share of the remaining way that 50 ms aim to cover
+_GAIN_HZ = 20  # the rate that this is said for
 _TOP = 0.285  # m, highest set-point
 
 
@@ -41,13 +42,14 @@ def servo(
     view: the observation.
     goal: of the TCP, m.
     speed: largest |a|.
-    gain: share of the remaining way that a step covers near the goal.
+    gain: share of the remaining way that 50 ms cover near the goal.
 
   Returns:
     The action's first three values, |a| at most `speed`.
   """
+  share = 1.0 - (1.0 - gain) ** (_GAIN_HZ / view.control_hz)
   wanted = [
-    gain / _STEP * (to - at)
+    share / _FASTEST * view.control_hz * (to - at)
     for to, at in zip(goal, view.set_point, strict=True)
   ]
   size = math.hypot(*wanted)

@@ -45,6 +45,7 @@ class View:
     opening: mean opening of the fingers, 0 closed to 1 open.
     opening_rate: its change over the last step, > 0 when the fingers open.
     blue, green: the blocks.
+    control_hz: control steps a second.
   """
 
   tcp: Vector
@@ -53,13 +54,14 @@ class View:
   opening_rate: float
   blue: BlockView
   green: BlockView
+  control_hz: int = 20
 
   def other(self, block: BlockView) -> BlockView:
     """The block that is not `block`."""
     return self.green if block is self.blue else self.blue
 
 
-def look(observation: np.ndarray) -> View:
+def look(observation: np.ndarray, control_hz: int = 20) -> View:
   """Names the floats of a flat observation, float32 [59]."""
   o = observation.tolist()
   opening = (o[6] + o[7]) / 2
@@ -75,6 +77,7 @@ def look(observation: np.ndarray) -> View:
     opening_rate=opening - before,
     blue=_block(o[12:19]),
     green=_block(o[19:26]),
+    control_hz=control_hz,
   )
 
 

@@ -26,6 +26,7 @@ _BAD = (
   ("--output=new --collection=film", "valid: reset, play"),
   ("--output=new --pairs_per_task=0", "--pairs_per_task=0; valid: 1 or more"),
   ("--output=new --final_pairs=-1", "--final_pairs=-1; valid: 0 or more"),
+  ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),
   ("--output=new --seed=-1", "--seed=-1; valid: 0 or more"),
   ("--output=new --workers=-1", "--workers=-1; valid: 0 or more"),
   ("--output=new --expert=no/run", "no run folder no/run"),
@@ -50,7 +51,8 @@ class CollectDemonstrationsTest(absltest.TestCase):
     self.folder = self.create_tempdir().full_path
 
   def test_writes_a_checked_file_a_task_and_a_table(self):
-    line = "--task=lift --pairs_per_task=25 --seed=3 --output=data/lift"
+    line = "--task=lift --pairs_per_task=12 --seed=3 --output=data/lift"
+    line += " --control_hz=5"
     done = _start(line, self.folder)
     output, errors = done.communicate()
     self.assertEqual(done.returncode, 0, errors)
@@ -58,7 +60,7 @@ class CollectDemonstrationsTest(absltest.TestCase):
     parent = pathlib.Path(self.folder) / "data"
     self.assertEqual(os.listdir(parent), ["lift"])
     found = demonstrations.read_folder(parent / "lift", ["lift"], 59, 4)
-    self.assertLen(found["lift"], 25)
+    self.assertLen(found["lift"], 12)
     attributes = dict(found["lift"].attributes)
     del attributes["schema_version"]
     self.assertEqual(
@@ -69,7 +71,7 @@ class CollectDemonstrationsTest(absltest.TestCase):
         "collection": "reset",
         "expert": "scripted",
         "seed": 3,
-        "control_hz": 20,
+        "control_hz": 5,
       },
     )
 

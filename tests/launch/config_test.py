@@ -73,6 +73,8 @@ class ConfigTest(parameterized.TestCase):
     ("--config.env_steps=0", "config.env_steps is 0; valid: 1 or more"),
     ("--config.agent.xi=0", "xi is 0; valid: an integer above 0"),
     ("--config.environment=toy", "config.environment is 'toy'; valid"),
+    ("--config.control_hz=7", "config.control_hz is 7; valid: 20, 10, 5"),
+    ("--config.control_hz=5", "episode_steps is 360; valid: 90, 18 s of 5 Hz"),
   )
   def test_bad_values_are_refused(self, argument, message):
     with self.assertRaisesWithLiteralMatch(ValueError, ""):
@@ -86,12 +88,17 @@ class ConfigTest(parameterized.TestCase):
     with self.assertRaises(flags.IllegalFlagValueError):
       resolve("--config.seed=many")
 
-  def test_unknown_and_missing_stored_fields_are_named(self):
+  def test_unknown_stored_fields_are_named(self):
     values = configs.RunConfig(agent=LfgpConfig()).to_dict()
-    del values["seed"]
     values["sed"] = 3
-    with self.assertRaisesRegex(ValueError, "unknown config.sed.*seed is miss"):
+    with self.assertRaisesRegex(ValueError, "unknown config.sed; .*seed"):
       configs.from_dict(values)
+
+  def test_a_run_older_than_a_field_has_its_default(self):
+    config = resolve("--config.algorithm=dac", "--config.seed=3")
+    values = config.to_dict()
+    del values["control_hz"], values["agent"]["layout"]
+    self.assertEqual(configs.from_dict(values), config)
 
 
 class FlagfilesTest(parameterized.TestCase):

@@ -115,6 +115,21 @@ class TrainingTest(parameterized.TestCase):
     ):
       self._train(self._config())
 
+  def test_demonstrations_of_another_rate_are_refused(self):
+    folder = pathlib.Path(self.create_tempdir().full_path) / "lift"
+    fixtures.write_dataset(folder, ("lift",), 59, 4)
+    config = self._config(
+      demonstrations=str(folder),
+      environment="",
+      main_task="lift",
+      control_hz=5,
+      **{"agent.episode_steps": 90},
+    )
+    with self.assertRaisesRegex(
+      UserError, r"config.control_hz is 5; .* another rate: lift \(20\)"
+    ):
+      self._train(config)
+
   def test_uses_the_first_pairs_alone(self):
     with mock.patch.object(loop, "train") as train:
       train.return_value = loop.Progress()

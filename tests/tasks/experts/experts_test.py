@@ -59,6 +59,20 @@ class ExpertTest(parameterized.TestCase):
     grips = np.unique(actions[:, 3])
     self.assertGreater(len(grips), 0.9 * len(actions))  # continuous
 
+  @parameterized.product(task=("reach", "stack", "bring"), control_hz=(5, 10))
+  def test_succeeds_at_other_control_rates_in_as_much_time(
+    self, task, control_hz
+  ):
+    environment = tasks.load(task, seed=0, control_hz=control_hz)
+    expert = make_expert(control_hz=control_hz)
+    for i in range(2):
+      environment.reseed(seeding.derive(3, "test", i))
+      expert.begin(task, i)
+      timestep = environment.reset()
+      for _ in range(10 * control_hz):
+        timestep = environment.step(expert.act(flatten(timestep.observation)))
+      self.assertTrue(timestep.observation[f"success/{task}"], f"reset {i}")
+
   @parameterized.parameters(*ALL_TASKS)
   def test_the_observation_alone_decides(self, task):
     environment = _environment(task)
