@@ -82,7 +82,7 @@ class Collector:
     """Builds the actor; environments are built when first needed."""
     self._plan = plan
     self._actor = plan.make_actor()
-    self._loaded = ""
+    self._environments: dict[str, Any] = {}
     self._environment: Any = None
 
   def __call__(self, job: Job) -> tuple[str | None, list[Attempt]]:
@@ -182,13 +182,14 @@ class Collector:
     return timestep, success
 
   def _load(self, task: str) -> None:
-    if task == self._loaded:
-      return
-    if self._loaded:
-      self._environment.close()
-    self._environment = self._plan.make_environment(task)
+    """Takes the task's environment; keeps it and the main task's."""
+    if task not in self._environments:
+      for other in [*self._environments]:
+        if other != self._plan.main_task:
+          self._environments.pop(other).close()
+      self._environments[task] = self._plan.make_environment(task)
+    self._environment = self._environments[task]
     self._flatten = environments.flattener(self._environment)
-    self._loaded = task
 
 
 class _Steps:
