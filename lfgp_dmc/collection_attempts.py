@@ -59,6 +59,15 @@ class Plan:
     """The same time in control steps, rounded up."""
     return math.ceil(at_20_hz * self.control_hz / 20)
 
+  def limit(self, task: str) -> int:
+    """Most control steps of an attempt.
+
+    Experts take longer at lower rates; without more time the hard starts would
+    be missing from the data.
+    """
+    at_20_hz = self.limits.get(task, LIMIT)
+    return self.steps(at_20_hz if self.control_hz >= 20 else 2 * at_20_hz)
+
 
 class Rows(NamedTuple):
   """The T steps of a successful attempt."""
@@ -112,8 +121,7 @@ class Collector:
       self._environment.clear_success()
     stored = before if task == CLOSE else _Steps()
     self._actor.begin(task, seeding.derive(seed, "actor"))
-    limit = plan.steps(plan.limits.get(task, LIMIT))
-    timestep, success = self._run(timestep, task, limit, stored)
+    timestep, success = self._run(timestep, task, plan.limit(task), stored)
     return Attempt(task, stored.rows() if success else None)
 
   def _lead(self, task: str, random: np.random.Generator) -> str | None:
@@ -151,7 +159,7 @@ class Collector:
       self._environment.clear_success()
       self._actor.begin(task, seeding.derive(seed, "actor", len(attempts)))
       steps = _Steps()
-      limit = plan.steps(plan.limits.get(task, LIMIT))
+      limit = plan.limit(task)
       timestep, success = self._run(timestep, task, min(limit, left), steps)
       left -= len(steps)
       if success:
