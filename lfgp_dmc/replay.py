@@ -237,13 +237,20 @@ class Replay:
     path = self._folder / f"{name}.npy"
     try:
       if path.exists():
+        # A file that was cut is refused by "r"; "r+" would fill it with 0.
+        np.lib.format.open_memmap(path, mode="r")
         mapped = np.lib.format.open_memmap(path, mode="r+")
+      elif (self._folder / SIDECAR).exists():
+        raise ValueError("it is missing")
       else:
         mapped = np.lib.format.open_memmap(
           path, mode="w+", dtype=np.float32, shape=shape
         )
     except ValueError as error:
-      raise ValueError(f"{path} is damaged: {error}") from None
+      raise ValueError(
+        f"{path} is damaged: {error}; without the folder {self._folder} the "
+        "run can be resumed too, and refills its replay first"
+      ) from None
     if mapped.shape != shape or mapped.dtype != np.float32:
       raise ValueError(
         f"{path} is {mapped.dtype} {list(mapped.shape)}; expected float32 "

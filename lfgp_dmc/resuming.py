@@ -72,11 +72,19 @@ def restore(
 
   Returns:
     The progress to hand to `loop.train`.
+
+  Raises:
+    CheckpointError: there are checkpoints, all damaged; nothing was changed.
   """
   path = checkpoints.latest(run.checkpoints)
+  if path is None and checkpoints.every(run.checkpoints):
+    raise checkpoints.CheckpointError(
+      f"every checkpoint in {run.checkpoints} is damaged; without that folder "
+      "--resume starts the run anew"
+    )
   progress, replay_total, last_step = Progress(), 0, -1
   if path is None:
-    logging.warning("%s has no good checkpoint: starting anew", run.path)
+    logging.warning("%s has no checkpoint yet: starting anew", run.path)
   else:
     state = checkpoints.load(path)
     agent.load_state_dict(state["agent"])

@@ -156,6 +156,13 @@ class MappedReplayTest(absltest.TestCase):
     (self._folder / "replay.json").write_text(json.dumps({"total": 1}))
     with self.assertRaisesRegex(ValueError, "replay.json is damaged"):
       Replay(4, 3, 2, self._folder)
+    path = self._folder / "action.npy"
+    path.write_bytes(path.read_bytes()[:-1])
+    with self.assertRaisesRegex(ValueError, "action.npy is damaged"):
+      Replay(4, 3, 2, self._folder)
+    path.unlink()
+    with self.assertRaisesRegex(ValueError, "action.npy is damaged: it is mis"):
+      Replay(4, 3, 2, self._folder)
     (self._folder / "action.npy").write_bytes(b"nothing")
     with self.assertRaisesRegex(ValueError, "action.npy"):
       Replay(4, 3, 2, self._folder)

@@ -169,6 +169,17 @@ class ResumingTest(absltest.TestCase):
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
 
+  def test_a_run_of_damaged_checkpoints_alone_is_left_as_it_is(self):
+    path = self._folder / "killed"
+    with self.assertRaises(_Killed):
+      self._run(path, die_at=250)
+    for checkpoint in checkpoints.every(path / "checkpoints"):
+      (checkpoint / "state.json").write_text("{}")
+    before = self._numbers(path)
+    with self.assertRaisesRegex(ValueError, "every checkpoint .* is damaged"):
+      self._run(path, resume=True)
+    self.assertEqual(self._numbers(path), before)
+
   def test_without_its_replay_a_run_refills_it(self):
     path = self._folder / "killed"
     with self.assertRaises(_Killed):
