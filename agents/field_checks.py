@@ -15,6 +15,30 @@ def is_number(value: Any) -> bool:
   return is_real and abs(value) < float("inf")  # false for NaN
 
 
+def positions(slices: str) -> tuple[int, ...]:
+  """The numbers of floats that slices such as "3:6,53:59" name.
+
+  Raises:
+    ValueError: something else than START:STOP, with commas between.
+  """
+  found: list[int] = []
+  for part in filter(None, slices.split(",")):
+    start, stop = map(int, part.split(":"))
+    if not 0 <= start < stop:
+      raise ValueError(f"{part} names no floats")
+    found += range(start, stop)
+  return tuple(found)
+
+
+def are_slices(value: Any) -> bool:
+  """Whether `positions` takes it."""
+  try:
+    positions(value)
+  except (ValueError, AttributeError):
+    return False
+  return True
+
+
 # What is valid, as messages say it -> its test.
 TESTS: dict[str, Callable[[Any], bool]] = {
   "an integer above 0": lambda value: is_integer(value) and value > 0,
@@ -28,6 +52,7 @@ TESTS: dict[str, Callable[[Any], bool]] = {
   ),
   "a number above 0, below 1": lambda value: is_number(value) and 0 < value < 1,
   "a folder's name, or nothing": lambda value: isinstance(value, str),
+  "slices of an observation, such as 3:6,53:59": are_slices,
   "True or False": lambda value: isinstance(value, bool),
 }
 

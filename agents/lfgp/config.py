@@ -63,6 +63,7 @@ class LfgpConfig:
   discriminator_learning_rate: float = 3e-4
   discriminator_batch_size: int = 256  # expert pairs a task
   discriminator_input: str = "state_action"  # or "state"
+  discriminator_unseen: str = ""  # of an observation, such as 3:6,53:59
   discriminator_noise: float = 0.0  # on observations, in deviations
   discriminator_every: int = 1  # updates between its updates
   discriminator_final_share: float = 0.0  # of expert pairs, rows of success
@@ -213,6 +214,7 @@ _RANGES = {
   "a number above 0, at most 1": "polyak scheduler_decay",
   "True or False": _SWITCHES,
   "a folder's name, or nothing": "init_from",
+  "slices of an observation, such as 3:6,53:59": "discriminator_unseen",
 }
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,

@@ -7,6 +7,7 @@ from typing import TypeVar
 import torch
 from torch import nn
 
+from agents import field_checks
 from agents.lfgp.config import LfgpConfig
 from agents.networks import layouts
 from agents.networks.critics import CriticNetwork
@@ -91,6 +92,7 @@ def make_networks(
       hidden,
       generator,
       config.discriminator_input,
+      unseen_inputs(config.discriminator_unseen, standardiser),
     ).to(device)
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
@@ -101,6 +103,26 @@ def make_networks(
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
     prior=_frozen_copy(intentions) if config.prior_weight else None,
   )
+
+
+def unseen_inputs(slices: str, standardiser: Standardiser) -> list[int]:
+  """Which network inputs stand for some floats of the observation.
+
+  Args:
+    slices: of the observation, such as "3:6,53:59".
+    standardiser: what makes inputs of it, at one scale or two.
+
+  Raises:
+    ValueError: the observation has fewer floats.
+  """
+  size = len(standardiser.mean)
+  chosen = field_checks.positions(slices)
+  if chosen and max(chosen) >= size:
+    raise ValueError(
+      f"discriminator_unseen is {slices}; the observation has {size} floats"
+    )
+  scales = 2 if standardiser.fine_scale else 1
+  return [scale * size + at for scale in range(scales) for at in chosen]
 
 
 def _frozen_copy(network: _Network) -> _Network:

@@ -1,5 +1,7 @@
 """One discriminator network with a logit a task, high for the expert's."""
 
+from collections.abc import Sequence
+
 import torch
 from torch import nn
 
@@ -16,6 +18,8 @@ class Discriminator(nn.Module):
   task k (the paper's supplement, model architectures).
   """
 
+  seen: torch.Tensor
+
   def __init__(
     self,
     tasks: int,
@@ -24,6 +28,7 @@ class Discriminator(nn.Module):
     hidden: int,
     generator: torch.Generator,
     inputs: str = "state_action",
+    unseen: Sequence[int] = (),
   ):
     """Draws all layers.
 
@@ -34,16 +39,22 @@ class Discriminator(nn.Module):
       hidden: H, units of each hidden layer.
       generator: source of the initial numbers.
       inputs: "state_action" (paper) or "state": the action is not shown.
+      unseen: which of the O floats are not shown either.
     """
     super().__init__()
     self.sees_action = inputs == "state_action"
-    size = observations + (actions if self.sees_action else 0)
+    seen = torch.tensor(sorted({*range(observations)} - {*unseen}))
+    self.register_buffer("seen", seen, persistent=False)
+    self.sees_all = len(seen) == observations
+    size = len(seen) + (actions if self.sees_action else 0)
     self.first = make_linear(size, hidden, generator)
     self.second = make_linear(hidden, hidden, generator)
     self.output = make_linear(hidden, tasks, generator)
 
   def join(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Lays out what the discriminator sees, [..., I]."""
+    if not self.sees_all:
+      inputs = inputs[..., self.seen]
     if self.sees_action:
       return torch.cat([inputs, action], dim=-1)
     return inputs

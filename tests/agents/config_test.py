@@ -47,6 +47,8 @@ class LfgpConfigTest(parameterized.TestCase):
     ("actor_trunk", "none", "shared, own"),
     ("discriminator_input", "pixels", "state_action, state"),
     ("discriminator_noise", 0.3, "0 unless standardise"),
+    ("discriminator_unseen", "3:6,9", "slices of an observation, such as 3:6"),
+    ("discriminator_unseen", "6:3", "slices of an observation, such as 3:6"),
     ("random_steps", -1, "an integer, 0 or more"),
   )
   def test_errors_name_field_value_and_what_is_valid(self, name, value, valid):

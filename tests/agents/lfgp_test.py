@@ -219,6 +219,21 @@ class ContractTest(parameterized.TestCase):
     found = [row.tobytes() in rows for row in batch.inputs.numpy()]
     self.assertEqual(sum(found), 8)
 
+  def test_unseen_floats_earn_nothing_at_either_scale(self):
+    agent = _build(
+      discriminator_unseen="1:3", discriminator_input="state", fine_scale=0.1
+    )
+    raw, action = torch.zeros(1, OBS), torch.zeros(1, A)
+    standardiser = agent.learner.networks.intentions.standardiser
+    rewards = [agent.learner.rewards(standardiser(raw), action)]
+    for at in (2, 3):
+      raw[:, at] = 1.0
+      rewards.append(agent.learner.rewards(standardiser(raw), action))
+    torch.testing.assert_close(rewards[1], rewards[0])
+    self.assertFalse(torch.equal(rewards[2], rewards[0]))
+    with self.assertRaisesRegex(ValueError, "9:11; the observation has 10"):
+      _build(discriminator_unseen="9:11")
+
   def test_wrong_sizes_are_refused(self):
     with self.assertRaisesRegex(ValueError, "demonstrations of stack.*floats"):
       build(

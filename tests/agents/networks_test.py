@@ -161,6 +161,16 @@ class DiscriminatorTest(parameterized.TestCase):
     joined = network.join(state, torch.ones(B, A))
     self.assertEqual(tuple(joined.shape), (B, OBS))
 
+  def test_unseen_floats_make_no_difference(self):
+    network = Discriminator(K, OBS, A, H, _generator(), unseen=(0, 2))
+    state, action = torch.zeros(B, OBS), torch.zeros(B, A)
+    joined = network.join(state, action)
+    self.assertEqual(tuple(joined.shape), (B, OBS - 2 + A))
+    state[:, [0, 2]] = 1.0
+    torch.testing.assert_close(network.join(state, action), joined)
+    state[:, 1] = 1.0
+    self.assertFalse(torch.equal(network.join(state, action), joined))
+
 
 class StandardiserTest(absltest.TestCase):
   def test_floor_on_the_deviation(self):
