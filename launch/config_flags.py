@@ -40,7 +40,7 @@ def define(
     "preset",
     "paper",
     "Defaults of the config: paper (the paper's tables), ral (the authors' "
-    "later journal version) or fast (ours, provisional). --config.x=... "
+    "later journal version) or fast (ours). --config.x=... "
     "overrides.",
     flag_values=flag_values,
   )

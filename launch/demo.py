@@ -37,9 +37,7 @@ _RUN = flags.DEFINE_string(
 _HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
 _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
 _CLIPS = 3  # intentions shown in the video
-_MOST_STEPS = 160  # of each
-_EVERY = 2  # control steps a frame
-_RATE = 20.0  # control steps a second
+_MOST_SECONDS = 8  # of each
 
 
 def main() -> int:
@@ -147,8 +145,8 @@ def _film(
       environment.reset(),
       functools.partial(_one_task, row.task),
       seed,
-      clips.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
-      max_steps=_MOST_STEPS,
+      clips.Look(_HEIGHT.value, _WIDTH.value),
+      max_steps=_MOST_SECONDS * config.control_hz,
       until_success_of=row.task,
     )
     frames += clip.frames
@@ -156,7 +154,7 @@ def _film(
   return video.write(
     path / "video.mp4",
     frames,
-    _RATE / _EVERY,
+    config.control_hz,
     {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
   )
 

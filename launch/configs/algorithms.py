@@ -62,6 +62,7 @@ ALGORITHMS: dict[str, Algorithm] = {
       "expert_share": 0.0,
       "bc_weight": 0.0,
       "bc_warm_start_updates": 0,
+      "prior_weight": 0.0,
       "standardise": False,
       "discriminator_noise": 0.0,
     },
