@@ -19,7 +19,7 @@ class Look:
   height: int = 480
   width: int = 640
   camera: str = "three_quarter"
-  every: int = 1  # control steps a frame; 0: no frames
+  every: int = 1  # 50 ms a frame: control steps at 20 Hz; 0: no frames
   overlay: bool = True
   shadows: bool = True  # and smooth edges; three quarters of a frame's time
   scheduled_for: str = ""  # the main task, if its scheduler chooses
@@ -33,6 +33,7 @@ class Clip:
   labels: list[str]  # the intention of each frame
   first_success: dict[str, int]  # task -> control step
   steps: int
+  checks: int = 1  # 50 ms in a control step
 
 
 def record(
@@ -61,29 +62,67 @@ def record(
     The clip.
   """
   prepare(environment, look)
+  recorder = _Recorder(environment, look)
   flatten = environments.flattener(environment)
-  clip, timestep, task, tail = Clip([], [], {}, 0), first, "", 0
-  while True:
-    wanted = choose(clip.steps, timestep)
-    if wanted != task:
-      task = wanted
-      actor.begin(task, seed + clip.steps)
-    if look.every and (clip.steps % look.every == 0 or timestep.last()):
-      clip.frames.append(_frame(environment, timestep, task, clip, look))
-      clip.labels.append(task)
-    if timestep.last() or clip.steps == max_steps:
-      return clip
-    timestep = environment.step(actor.act(flatten(timestep.observation)))
-    clip.steps += 1
-    for name in set(_successes(timestep)) - set(clip.first_success):
-      clip.first_success[name] = clip.steps
-    if until_success_of in clip.first_success:
-      tail += 1
-      if tail > _TAIL:
+  clip, timestep, tail = recorder.clip, first, 0
+  try:
+    while True:
+      wanted = choose(clip.steps, timestep)
+      if wanted != recorder.task:
+        recorder.task = wanted
+        actor.begin(wanted, seed + clip.steps)
+      recorder.begin_step(timestep)
+      if timestep.last() or clip.steps == max_steps:
         return clip
+      timestep = environment.step(actor.act(flatten(timestep.observation)))
+      clip.steps += 1
+      for name in set(_successes(timestep)) - set(clip.first_success):
+        clip.first_success[name] = clip.steps
+      if until_success_of in clip.first_success:
+        tail += clip.checks
+        if tail > _TAIL:
+          return clip
+  finally:
+    recorder.close()
 
 
-_TAIL = 20  # control steps shown after a success
+class _Recorder:
+  """Takes the frames, between control steps too where there is more to see."""
+
+  def __init__(self, environment: dm_env.Environment, look: Look):
+    checks = getattr(environment, "checks", 1)
+    self.clip = Clip([], [], {}, 0, checks)
+    self.task = ""
+    self._environment, self._look = environment, look
+    if checks > 1:
+      environment.on_check = self._on_check  # type: ignore[attr-defined]
+
+  def begin_step(self, timestep: dm_env.TimeStep) -> None:
+    """Takes the frame of a control step's beginning, if it is due."""
+    self._timestep, self._check = timestep, 0
+    self._take(is_last=timestep.last())
+
+  def close(self) -> None:
+    """Lets go of the environment."""
+    if self.clip.checks > 1:
+      self._environment.on_check = None  # type: ignore[attr-defined]
+
+  def _on_check(self) -> None:
+    self._check += 1
+    if self._check < self.clip.checks:  # the next step begins with the last
+      self._take()
+
+  def _take(self, is_last: bool = False) -> None:
+    clip, look = self.clip, self._look
+    now = clip.steps * clip.checks + self._check
+    if look.every and (now % look.every == 0 or is_last):
+      clip.frames.append(
+        _frame(self._environment, self._timestep, self.task, clip, look)
+      )
+      clip.labels.append(self.task)
+
+
+_TAIL = 20  # 50 ms checks shown after a success
 
 
 def prepare(environment: dm_env.Environment, look: Look) -> None:

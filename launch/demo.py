@@ -38,6 +38,8 @@ _HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
 _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
 _CLIPS = 3  # intentions shown in the video
 _MOST_SECONDS = 8  # of each
+_EVERY = 2  # 50 ms a frame
+_RATE = 20.0  # 50 ms a second
 
 
 def main() -> int:
@@ -145,7 +147,7 @@ def _film(
       environment.reset(),
       functools.partial(_one_task, row.task),
       seed,
-      clips.Look(_HEIGHT.value, _WIDTH.value),
+      clips.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_SECONDS * config.control_hz,
       until_success_of=row.task,
     )
@@ -154,7 +156,7 @@ def _film(
   return video.write(
     path / "video.mp4",
     frames,
-    config.control_hz,
+    _RATE / _EVERY,
     {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
   )
 

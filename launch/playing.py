@@ -42,13 +42,13 @@ def make_switch(
   return lambda step, timestep: task
 
 
-def spans(labels: Sequence[str], every: int) -> list[dict[str, int | str]]:
-  """Who acted from which control step on."""
+def spans(labels: Sequence[str], every: float) -> list[dict[str, int | str]]:
+  """Who acted from which control step on; `every`: control steps a frame."""
   starts: list[dict[str, int | str]] = []
-  step = 0
+  frames = 0
   for label, group in itertools.groupby(labels):
-    starts.append({"from_step": step, "intention": label})
-    step += every * len(list(group))
+    starts.append({"from_step": int(every * frames), "intention": label})
+    frames += len(list(group))
   return starts
 
 

@@ -67,7 +67,7 @@ _SHADOWS = flags.DEFINE_bool(
   "shadows", True, "Shadows and smooth edges; without, 3 times as fast."
 )
 _EVERY = flags.DEFINE_integer(
-  "every", 1, "Control steps a frame.", lower_bound=1
+  "every", 1, "50 ms a frame: control steps at 20 Hz.", lower_bound=1
 )
 _STEPS = flags.DEFINE_integer(
   "steps", 0, "Control steps at most; 0: the whole episode.", lower_bound=0
@@ -84,6 +84,8 @@ _UNTIL = flags.DEFINE_bool(
 )
 
 _MOST_CELLS = 100
+
+_RATE = 20.0  # 50 ms a second
 
 
 def main() -> None:
@@ -143,7 +145,7 @@ def _film(task: str, rows: int, columns: int) -> None:
   frames = video.grid([clip.frames for clip in played], columns)
   if output.suffix == ".png":
     frames = video.film_strip(frames, _STRIP.value if len(played) == 1 else 1)
-  video.write(output, frames, cast.world.control_hz / _EVERY.value, metadata)
+  video.write(output, frames, _RATE / _EVERY.value, metadata)
   for clip in played:
     done = ", ".join(f"{k} at step {v}" for k, v in clip.first_success.items())
     print(f"successes: {done or 'none'}")
@@ -196,7 +198,7 @@ def _description(clip: clips.Clip, seed: int) -> dict[str, Any]:
     "seed": seed,
     "steps": clip.steps,
     "first_success": clip.first_success,
-    "intentions": playing.spans(clip.labels, _EVERY.value),
+    "intentions": playing.spans(clip.labels, _EVERY.value / clip.checks),
   }
 
 

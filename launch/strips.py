@@ -100,7 +100,7 @@ def rows(
       environment=world,
     )
     world.close()
-    cells += [[clip.frames[step]] for step in steps]
+    cells += [[clip.frames[step * clip.checks]] for step in steps]
     shown.append({"task": task, "actor": cast.name, "seed": found[0],
                   "success_at": found[1]})  # fmt: skip
   return video.grid(cells, columns)[0], shown

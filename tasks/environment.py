@@ -1,5 +1,7 @@
 """The play world as a dm_env environment: Composer, made fast and seedable."""
 
+from collections.abc import Callable
+
 import dm_env
 import numpy as np
 from absl import logging
@@ -60,6 +62,8 @@ class PlayEnvironment(composer.Environment):
 
   Attributes:
     physics_failures: episodes that ended in a divergence of the simulation.
+    checks: times that conditions are checked in a control step, every 50 ms.
+    on_check: called after each, so that films at low control rates are smooth.
   """
 
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
@@ -67,7 +71,8 @@ class PlayEnvironment(composer.Environment):
     self._steps = 0
     self._reset_next_step: bool
     self._step_limit = round(time_limit / task.control_timestep)
-    self._checks = round(task.control_timestep / ws.CHECK_PERIOD)
+    self.checks = round(task.control_timestep / ws.CHECK_PERIOD)
+    self.on_check: Callable[[], None] | None = None
     self._steps_per_check = round(ws.CHECK_PERIOD / task.physics_timestep)
     self.physics_failures = 0
     super().__init__(
@@ -152,9 +157,11 @@ class PlayEnvironment(composer.Environment):
     self._observation_updater.prepare_for_next_control_step()
     failed = False
     try:
-      for _ in range(self._checks):
+      for _ in range(self.checks):
         self._physics.step(self._steps_per_check)
         task.check(physics)
+        if self.on_check is not None:
+          self.on_check()
     except control.PhysicsError as error:
       self.physics_failures += 1
       failed = True

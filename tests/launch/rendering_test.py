@@ -1,5 +1,6 @@
 """Pictures of policies, and stored policies in user code and the viewer."""
 
+import itertools
 import json
 import pathlib
 import subprocess
@@ -113,6 +114,16 @@ class RenderingTest(_PolicyTest):
     sidecar = json.loads((self.folder / "g.json").read_text())
     self.assertEqual(sidecar["task"], "reach")
     self.assertEqual([one["seed"] for one in sidecar["grid"]], [0, 1, 2])
+
+  def test_low_control_rates_are_filmed_every_50_ms(self):
+    done = self._render("--expert=scripted", "--task=reach", "--control_hz=5",
+                        "--steps=3", "--every=2", "--output=h.gif")  # fmt: skip
+    self.assertEqual(done.returncode, 0, done.stderr)
+    sidecar = json.loads((self.folder / "h.json").read_text())
+    self.assertEqual((sidecar["frames"], sidecar["fps"]), (7, 10.0))
+    frames = imageio.mimread(self.folder / "h.gif")
+    for one, next_one in itertools.pairwise(frames):
+      self.assertFalse(np.array_equal(one, next_one))
 
   def test_strips_show_a_success(self):
     done = self._render("--what=strips", "--expert=scripted", "--task=reach",
