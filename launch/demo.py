@@ -111,7 +111,8 @@ def _evaluate_untrained(config: RunConfig) -> list[EvaluationRow]:
 
 def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
   print("evaluating the scripted expert on the same resets", flush=True)
-  return _evaluate(config, actors.scripted_expert)
+  expert = functools.partial(actors.scripted_expert, config.control_hz)
+  return _evaluate(config, expert)
 
 
 def _evaluate(config: RunConfig, make_actor) -> list[EvaluationRow]:
