@@ -45,11 +45,6 @@ _HERTZ = flags.DEFINE_integer(
 )
 
 
-def load(control_hz: int, task: str):
-  """Builds the environment of a task; importable by workers."""
-  return lfgp_dmc.load(task, control_hz=control_hz)
-
-
 def sampling_actor(make_policy) -> Actor:
   """A stored policy that samples its actions, as the paper's experts do."""
   policy = make_policy()
@@ -77,7 +72,7 @@ def main() -> int:
       f"--task={_TASK.value}; it can do: {', '.join(cast.tasks)}"
     )
   plan = Plan(
-    functools.partial(load, _HERTZ.value),
+    functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),
     make_actor,
     _TASK.value,
     all_tasks,

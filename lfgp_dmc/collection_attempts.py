@@ -21,7 +21,6 @@ LIMITS = {"unstack_stack": 120, "bring": 150, "insert": 240}
 OPEN, CLOSE, LIFT = "open_gripper", "close_gripper", "lift"
 OPEN_LEAD = 45  # steps of another task before Open-Gripper, not stored
 CLOSE_LEAD = 15  # steps of Lift before Close-Gripper, stored
-PLAY = 360  # steps between resets in play-based collection
 MAIN_LEAD_SHARE = 0.25  # of Open-Gripper's leads that are the main task
 
 
@@ -52,7 +51,7 @@ class Plan:
   tasks: tuple[str, ...]
   seed: int
   control_hz: int = 20
-  play_steps: int = PLAY
+  play_steps: int = 360
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
 
   def steps(self, at_20_hz: int) -> int:
