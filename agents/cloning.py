@@ -8,13 +8,35 @@ import torch
 
 from agents import serialisation
 from agents.experts import ExpertBatch
-from agents.losses.behaviour_cloning import behaviour_cloning_loss
+from agents.losses.behaviour_cloning import (
+  behaviour_cloning_loss,
+  likelihood_loss,
+)
 from agents.networks.intentions import IntentionNetwork
 from agents.optimisation import (
   clipped_step,
   make_optimiser,
   product_dtype,
 )
+
+
+# What is asked of the intentions: the expert's action as their mean, or the
+# expert's actions as their distribution.
+SQUARED_ERROR, LIKELIHOOD = "squared_error", "likelihood"
+LOSSES = (SQUARED_ERROR, LIKELIHOOD)
+
+
+def cloning_loss(
+  name: str,
+  mean: torch.Tensor,
+  deviation: torch.Tensor,
+  action: torch.Tensor,
+  weight: torch.Tensor | None = None,
+) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+  """The loss by a name in `LOSSES`; see `behaviour_cloning_loss`."""
+  if name == LIKELIHOOD:
+    return likelihood_loss(mean, deviation, action, weight)
+  return behaviour_cloning_loss(mean, action, weight)
 
 
 class IntentionCloner:
@@ -27,6 +49,7 @@ class IntentionCloner:
     weight_decay: float = 0.0,
     max_gradient_norm: float = math.inf,
     bfloat16: bool = False,
+    loss: str = SQUARED_ERROR,
   ):
     """Makes the optimiser.
 
@@ -36,6 +59,7 @@ class IntentionCloner:
       weight_decay: above 0: AdamW with this decay.
       max_gradient_norm: bound on the gradient's norm.
       bfloat16: compute products in bfloat16.
+      loss: a name in `LOSSES`.
     """
     self._network = network
     self._parameters = network.trained_parameters()
@@ -44,11 +68,12 @@ class IntentionCloner:
     )
     self._max_gradient_norm = max_gradient_norm
     self._dtype = product_dtype(bfloat16)
+    self._loss = loss
 
   def loss(self, batch: ExpertBatch) -> tuple[torch.Tensor, dict]:
-    """The loss of a batch; see `behaviour_cloning_loss`."""
-    mean, _ = self._network(batch.inputs.to(self._dtype))
-    return behaviour_cloning_loss(mean, batch.action)
+    """The loss of a batch; see `cloning_loss`."""
+    mean, deviation = self._network(batch.inputs.to(self._dtype))
+    return cloning_loss(self._loss, mean, deviation, batch.action)
 
   def update(self, batch: ExpertBatch) -> dict[str, torch.Tensor]:
     """Makes one update.
@@ -57,7 +82,7 @@ class IntentionCloner:
       batch: each task's own pairs.
 
     Returns:
-      The metrics of `behaviour_cloning_loss`.
+      The metrics of `cloning_loss`.
     """
     loss, metrics = self.loss(batch)
     if math.isinf(self._max_gradient_norm):

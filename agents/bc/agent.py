@@ -11,16 +11,15 @@ import torch
 from agents import serialisation
 from agents.bc.config import BcConfig
 from agents.bc.pairs import SplitPairs
-from agents.cloning import IntentionCloner
+from agents.cloning import IntentionCloner, cloning_loss
 from agents.experts import (
   DemonstrationArrays,
   check_sizes,
   pooled_observations,
 )
-from agents.losses.behaviour_cloning import behaviour_cloning_loss
 from agents.metering import Meter
 from agents.networks import layouts
-from agents.networks.intentions import IntentionNetwork
+from agents.networks.intentions import IntentionNetwork, to_deviation
 from agents.networks.trunk import Standardiser
 from agents.policy import Policy
 from lfgp_dmc import seeding
@@ -67,6 +66,7 @@ class BcAgent:
       config.weight_decay,
       config.max_gradient_norm or math.inf,
       config.bfloat16,
+      config.loss,
     )
     device = network.standardiser.mean.device
     self._meter = Meter(tasks, (f"loss/{_LOSS}",), (_LOSS,), device)
@@ -106,8 +106,11 @@ class BcAgent:
     with torch.inference_mode():
       for index in range(len(self.tasks)):
         inputs, action = self._pairs.validation(index)
-        mean, _ = network.heads.one(network.trunk(inputs[0]), index)
-        loss, _ = behaviour_cloning_loss(mean[None], action)
+        mean, raw = network.heads.one(network.trunk(inputs[0]), index)
+        deviation = to_deviation(raw)
+        loss, _ = cloning_loss(
+          self._config.loss, mean[None], deviation[None], action
+        )
         losses.append(loss.item())
     return losses
 

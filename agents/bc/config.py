@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from agents import field_checks
+from agents import cloning, field_checks
 from agents.networks import layouts
 
 
@@ -19,6 +19,7 @@ class BcConfig:
   bfloat16: bool = False  # products in bfloat16; parameters stay float32
 
   # Training.
+  loss: str = cloning.SQUARED_ERROR  # or "likelihood"
   batch_size: int = 256  # pairs a task
   learning_rate: float = 3e-4
   weight_decay: float = 0.0  # above 0: AdamW
@@ -28,11 +29,12 @@ class BcConfig:
 
   def __post_init__(self):
     """Raises ValueError that lists every field out of its range."""
-    faults = field_checks.faults(self, _RANGES, {"layout": layouts.LAYOUTS})
+    faults = field_checks.faults(self, _RANGES, _CHOICES)
     if faults:
       raise ValueError(f"BcConfig: {'; '.join(faults)}")
 
 
+_CHOICES = {"layout": layouts.LAYOUTS, "loss": cloning.LOSSES}
 _RANGES = {
   "an integer above 0": "hidden_size batch_size overfit_tolerance",
   "a number above 0": "deviation_floor learning_rate",

@@ -292,6 +292,7 @@ class LfgpAgent:
       config.weight_decay,
       config.max_gradient_norm,
       config.bfloat16,
+      config.bc_loss,
     )
     updates = tqdm.trange(
       1,
@@ -308,6 +309,6 @@ class LfgpAgent:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")
     intentions.owns_trunk = config.owns_trunk
-    if config.cloned_deviation:  # cloning says nothing of it
+    if config.cloned_deviation:  # the squared error says nothing of it
       intentions.heads.set_deviation(config.cloned_deviation)
     self.learner.adopt_intention_trunk()

@@ -2,10 +2,14 @@
 
 import torch
 
+from agents import cloning
 from agents.experts import ExpertBatch
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.networks import LfgpNetworks
-from agents.losses.behaviour_cloning import behaviour_cloning_loss
+from agents.losses.behaviour_cloning import (
+  behaviour_cloning_loss,
+  divergence_loss,
+)
 
 Metrics = dict[str, torch.Tensor]
 
@@ -13,7 +17,8 @@ Metrics = dict[str, torch.Tensor]
 class CloningTerms:
   """The BC term, on expert rows, and the prior's, on the replay's rows.
 
-  A term's weight fades by `bc_decay` an update and, with `bc_normalise`, is
+  What is near is what `bc_loss` says: the squared error of the mean action, or
+  the divergence from the prior's distribution. A term's weight fades by `bc_decay` an update and, with `bc_normalise`, is
   counted in each task's mean |Q|, with which the rest of the loss grows.
   """
 
@@ -27,6 +32,7 @@ class CloningTerms:
     expert: ExpertBatch | None,
     inputs: torch.Tensor,
     mean: torch.Tensor,
+    deviation: torch.Tensor,
     q: torch.Tensor,
     updates: int,
   ) -> tuple[torch.Tensor | float, Metrics]:
@@ -36,6 +42,7 @@ class CloningTerms:
       expert: each task's own pairs; None: no BC term.
       inputs: [B, O], the replay's rows, in the products' dtype.
       mean: [K, B, A], the intentions' means there, before the tanh.
+      deviation: [K, B, A], their standard deviations, likewise.
       q: [2, K, B], the critics' values there; no gradient goes into them.
       updates: how many were made before.
 
@@ -46,15 +53,22 @@ class CloningTerms:
     loss: torch.Tensor | float = 0.0
     metrics: Metrics = {}
     if expert is not None and config.bc_weight > 0:
-      shown, _ = self._networks.intentions(expert.inputs.to(inputs.dtype))
+      shown = self._networks.intentions(expert.inputs.to(inputs.dtype))
       weight = self._weight(config.bc_weight, q, updates)
-      term, more = behaviour_cloning_loss(shown, expert.action, weight)
+      term, more = cloning.cloning_loss(
+        config.bc_loss, *shown, expert.action, weight
+      )
       loss, metrics = loss + term, more
     if self._networks.prior is not None:
       with torch.no_grad():
-        wanted = torch.tanh(self._networks.prior(inputs)[0])
+        wanted, wanted_deviation = self._networks.prior(inputs)
       weight = self._weight(config.prior_weight, q, updates)
-      term, more = behaviour_cloning_loss(mean, wanted, weight)
+      if config.bc_loss == cloning.LIKELIHOOD:
+        term, more = divergence_loss(
+          mean, deviation, wanted, wanted_deviation, weight
+        )
+      else:
+        term, more = behaviour_cloning_loss(mean, torch.tanh(wanted), weight)
       loss = loss + term
       metrics["distance_from_prior"] = more["behaviour_cloning"]
     return loss, metrics

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from agents import field_checks, rewards, schedulers
+from agents import cloning, field_checks, rewards, schedulers
 from agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
@@ -84,13 +84,16 @@ class LfgpConfig:
   # Use of demonstrations beyond the discriminators.
   expert_share: float = 0.0  # of the critics' and intentions' batch
   expert_share_decay: float = 1.0  # factor an update
+  bc_loss: str = cloning.SQUARED_ERROR  # or "likelihood"; prior: divergence
   bc_weight: float = 0.0  # BC term in the intentions' loss
   bc_normalise: bool = False  # times each task's mean |Q|
   bc_decay: float = 1.0  # factor on the weight an update
   prior_weight: float = 0.0  # stay near the first intentions, on all rows
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start
-  cloned_deviation: float = 0.0  # of actions after it; 0: as initialised, 0.7
+  cloned_deviation: float = (
+    0.0  # of actions after it; 0: left, 0.7 or as cloned
+  )
 
   # Other runs.
   init_from: str = ""  # policy folder whose intentions the actor starts from
@@ -218,6 +221,7 @@ _RANGES = {
 }
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,
+  "bc_loss": cloning.LOSSES,
   "discriminator_input": discriminator.INPUTS,
   "gradient_penalty_mixing": MIXINGS,
   "layout": layouts.LAYOUTS,

@@ -233,7 +233,9 @@ class LfgpLearner:
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
-    terms, more = self._cloning_terms(expert, inputs, mean, q, self.updates)
+    terms, more = self._cloning_terms(
+      expert, inputs, mean, deviation, q, self.updates
+    )
     loss, metrics = loss + terms, metrics | more
     norm = self._step("policy", loss, self._policy_parameters)
     saturated = (action.detach().abs() > _SATURATED).float()

@@ -29,5 +29,5 @@ TASK_METRICS = (
   "entropy",
   "saturation",  # share of the intention's action floats beyond 0.99
   "behaviour_cloning",
-  "distance_from_prior",  # squared, of the mean actions
+  "distance_from_prior",  # squared, of mean actions; or nats, see `bc_loss`
 )

@@ -1,8 +1,17 @@
-"""The loss of behaviour cloning."""
+"""The losses of behaviour cloning, and of staying near what was cloned."""
 
 import torch
 
+from agents.networks.tanh_gaussian import log_one_minus_tanh_squared
+
 Metrics = dict[str, torch.Tensor]
+
+# Of the likelihood: actions nearer to 1 than this have a mean at infinity, and
+# what an expert does the same way each time has a deviation that goes to 0.
+MOST_ACTION = 0.95
+LEAST_DEVIATION = 0.018  # before the tanh
+
+_LOG_SQRT_2_PI = 0.9189385332046727
 
 
 def behaviour_cloning_loss(
@@ -20,7 +29,73 @@ def behaviour_cloning_loss(
   Returns:
     The weighted sum over tasks, and the unweighted loss by task.
   """
-  by_task = (torch.tanh(mean) - action).square().sum(-1).mean(-1)
+  error = (torch.tanh(mean) - action).square().sum(-1)
+  return _over_tasks(error.mean(-1), weight)
+
+
+def likelihood_loss(
+  mean: torch.Tensor,
+  deviation: torch.Tensor,
+  action: torch.Tensor,
+  weight: torch.Tensor | None = None,
+) -> tuple[torch.Tensor, Metrics]:
+  """-log pi(a | s), mean over rows, all tasks equal.
+
+  Where the expert is precise, small errors weigh as much as large ones where
+  it is not, and the intention learns how precise to be.
+
+  Args:
+    mean: [K, N, A], task k's mean before the tanh, for task k's rows.
+    deviation: [K, N, A], likewise; below `LEAST_DEVIATION` it counts as that.
+    action: [K, N, A], the expert's; clipped to +-`MOST_ACTION`.
+    weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
+
+  Returns:
+    The weighted sum over tasks, and the unweighted loss by task, in nats.
+  """
+  deviation = deviation.clamp(min=LEAST_DEVIATION)
+  value = torch.atanh(action.clamp(-MOST_ACTION, MOST_ACTION))
+  log_prob = (
+    -0.5 * ((value - mean) / deviation).square()
+    - deviation.log()
+    - _LOG_SQRT_2_PI
+    - log_one_minus_tanh_squared(value)
+  )
+  return _over_tasks(-log_prob.sum(-1).mean(-1), weight)
+
+
+def divergence_loss(
+  mean: torch.Tensor,
+  deviation: torch.Tensor,
+  prior_mean: torch.Tensor,
+  prior_deviation: torch.Tensor,
+  weight: torch.Tensor | None = None,
+) -> tuple[torch.Tensor, Metrics]:
+  """KL(pi || prior), mean over rows, all tasks equal.
+
+  That of two Gaussians, as the tanh of both changes nothing.
+
+  Args:
+    mean: [K, N, A], before the tanh.
+    deviation: [K, N, A], likewise.
+    prior_mean: [K, N, A], of what to stay near.
+    prior_deviation: [K, N, A], likewise; below `LEAST_DEVIATION` it counts as
+      that.
+    weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
+
+  Returns:
+    The weighted sum over tasks, and the unweighted divergence by task, in
+    nats.
+  """
+  ratio = deviation / prior_deviation.clamp(min=LEAST_DEVIATION)
+  shift = (mean - prior_mean) / prior_deviation.clamp(min=LEAST_DEVIATION)
+  divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
+  return _over_tasks(divergence.sum(-1).mean(-1), weight)
+
+
+def _over_tasks(
+  by_task: torch.Tensor, weight: torch.Tensor | None
+) -> tuple[torch.Tensor, Metrics]:
   loss = by_task.mean() if weight is None else (weight * by_task).sum()
   return loss, {
     "loss/behaviour_cloning": loss.detach(),

@@ -114,6 +114,67 @@ class PolicyLossesTest(absltest.TestCase):
     )
     self.assertAlmostEqual(weighted.item(), 2.5, places=6)
 
+  def test_likelihood_by_hand_and_by_a_library(self):
+    # atanh(0.5) = 0.549306; deviation 0.5; normal density, Jacobian 1 - 0.25.
+    mean, deviation = torch.tensor([[[0.3]]]), torch.tensor([[[0.5]]])
+    action = torch.tensor([[[0.5]]])
+    loss, metrics = behaviour_cloning.likelihood_loss(mean, deviation, action)
+    by_hand = (
+      0.5 * ((0.549306 - 0.3) / 0.5) ** 2
+      + math.log(0.5)
+      + 0.5 * math.log(2 * math.pi)
+      + math.log(0.75)
+    )
+    self.assertAlmostEqual(loss.item(), by_hand, places=5)
+    squashed = torch.distributions.TransformedDistribution(
+      torch.distributions.Normal(mean, deviation),
+      [torch.distributions.TanhTransform()],
+    )
+    expected = -squashed.log_prob(action).sum(-1).mean(-1)
+    torch.testing.assert_close(metrics["behaviour_cloning"], expected)
+
+  def test_likelihood_weighs_errors_where_the_expert_is_precise(self):
+    mean = torch.zeros(1, 2, 1, requires_grad=True)
+    deviation = torch.tensor([[[0.05], [0.5]]])
+    loss, _ = behaviour_cloning.likelihood_loss(
+      mean, deviation, torch.full((1, 2, 1), 0.1)
+    )
+    loss.backward()
+    gradient = mean.grad.flatten()
+    self.assertAlmostEqual((gradient[0] / gradient[1]).item(), 100.0, places=3)
+
+  def test_likelihood_is_bounded_at_the_ends_of_actions_and_of_deviations(self):
+    mean = torch.zeros(1, 2, 1)
+    deviation = torch.tensor([[[1e-7], [0.0179]]])
+    ends = torch.tensor([[[1.0], [0.95]]])
+    loss, _ = behaviour_cloning.likelihood_loss(mean, deviation, ends)
+    self.assertTrue(torch.isfinite(loss))
+    low, _ = behaviour_cloning.likelihood_loss(
+      mean[:, :1], deviation[:, :1], ends[:, :1]
+    )
+    torch.testing.assert_close(low, loss)
+
+  def test_divergence_by_hand_and_by_a_library(self):
+    mean = torch.tensor([[[0.3, 0.0]], [[0.0, 0.0]]])
+    deviation = torch.tensor([[[0.2, 1.0]], [[0.1, 0.3]]])
+    prior_mean = torch.tensor([[[0.1, 0.0]], [[0.0, 0.0]]])
+    prior_deviation = torch.tensor([[[0.1, 1.0]], [[0.1, 0.3]]])
+    loss, metrics = behaviour_cloning.divergence_loss(
+      mean, deviation, prior_mean, prior_deviation, torch.tensor([2.0, 5.0])
+    )
+    by_hand = 0.5 * (4.0 + 4.0 - 1.0) - math.log(2.0)
+    torch.testing.assert_close(
+      metrics["behaviour_cloning"], torch.tensor([by_hand, 0.0])
+    )
+    self.assertAlmostEqual(loss.item(), 2.0 * by_hand, places=5)
+    expected = torch.distributions.kl_divergence(
+      torch.distributions.Normal(mean, deviation),
+      torch.distributions.Normal(prior_mean, prior_deviation),
+    )
+    torch.testing.assert_close(
+      metrics["behaviour_cloning"], expected.sum(-1).mean(-1)
+    )
+
 
 class TanhGaussianTest(absltest.TestCase):
   def test_log_density(self):

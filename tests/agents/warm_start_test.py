@@ -83,7 +83,7 @@ class FreezeTest(parameterized.TestCase):
     torch.testing.assert_close(_states(networks.critics.trunk), cloned)
 
 
-class CautiousStartTest(absltest.TestCase):
+class CautiousStartTest(parameterized.TestCase):
   def test_intentions_and_temperatures_wait_for_the_critics(self):
     agent = _build(intention_delay=2, intention_learning_rate=1e-3)
     networks = agent.learner.networks
@@ -111,12 +111,45 @@ class CautiousStartTest(absltest.TestCase):
     _, deviation = agent.learner.networks.intentions(rows)
     torch.testing.assert_close(deviation, torch.full_like(deviation, 0.1))
 
-  def test_a_prior_keeps_intentions_near_their_start_on_replayed_rows(self):
+  def test_likelihood_learns_how_precise_the_expert_is(self):
+    shown = synthetic.demonstrations(TASKS, 100, OBS, A)
+    random = np.random.default_rng(0)
+    for data in shown.values():  # the second action precise, the first not
+      data.action[:, 0] = random.normal(0.0, 0.3, len(data.action))
+      data.action[:, 1] = random.normal(0.2, 0.03, len(data.action))
+    agent = build(
+      LfgpConfig(
+        bc_warm_start_updates=300,
+        bc_loss="likelihood",
+        bc_learning_rate=3e-3,
+        hidden_size=16,
+        batch_size=64,
+      ),
+      TASKS,
+      shown,
+      synthetic.ArrayReplay(synthetic.transitions(200, OBS, A)),
+      0,
+      "cpu",
+      OBS,
+      A,
+    )
+    agent.prepare()
+    rows = torch.from_numpy(shown["stack"].observation)
+    _, deviation = agent.learner.networks.intentions(rows)
+    coarse, fine = deviation.mean((0, 1)).tolist()
+    self.assertBetween(coarse, 0.2, 0.6)
+    self.assertBetween(fine, 0.01, 0.06)
+
+  @parameterized.parameters("squared_error", "likelihood")
+  def test_a_prior_keeps_intentions_near_their_start_on_replayed_rows(
+    self, bc_loss
+  ):
     distances = []
     for weight in (1e-6, 100.0):
       agent = _build(
         actor_trunk="own",
         prior_weight=weight,
+        bc_loss=bc_loss,
         bc_warm_start_updates=5,
         intention_learning_rate=1e-2,
       )
