@@ -19,7 +19,6 @@ from agents.optimisation import (
   product_dtype,
 )
 
-
 # What is asked of the intentions: the expert's action as their mean, or the
 # expert's actions as their distribution.
 SQUARED_ERROR, LIKELIHOOD = "squared_error", "likelihood"

@@ -18,8 +18,9 @@ class CloningTerms:
   """The BC term, on expert rows, and the prior's, on the replay's rows.
 
   What is near is what `bc_loss` says: the squared error of the mean action, or
-  the divergence from the prior's distribution. A term's weight fades by `bc_decay` an update and, with `bc_normalise`, is
-  counted in each task's mean |Q|, with which the rest of the loss grows.
+  the divergence from the prior's distribution. A term's weight fades by
+  `bc_decay` an update and, with `bc_normalise`, is counted in each task's mean
+  |Q|, with which the rest of the loss grows.
   """
 
   def __init__(self, config: LfgpConfig, networks: LfgpNetworks):
@@ -53,10 +54,12 @@ class CloningTerms:
     loss: torch.Tensor | float = 0.0
     metrics: Metrics = {}
     if expert is not None and config.bc_weight > 0:
-      shown = self._networks.intentions(expert.inputs.to(inputs.dtype))
+      shown, shown_deviation = self._networks.intentions(
+        expert.inputs.to(inputs.dtype)
+      )
       weight = self._weight(config.bc_weight, q, updates)
       term, more = cloning.cloning_loss(
-        config.bc_loss, *shown, expert.action, weight
+        config.bc_loss, shown, shown_deviation, expert.action, weight
       )
       loss, metrics = loss + term, more
     if self._networks.prior is not None:

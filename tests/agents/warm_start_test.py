@@ -119,7 +119,7 @@ class CautiousStartTest(parameterized.TestCase):
       data.action[:, 1] = random.normal(0.2, 0.03, len(data.action))
     agent = build(
       LfgpConfig(
-        bc_warm_start_updates=300,
+        bc_warm_start_updates=500,
         bc_loss="likelihood",
         bc_learning_rate=3e-3,
         hidden_size=16,
@@ -138,7 +138,7 @@ class CautiousStartTest(parameterized.TestCase):
     _, deviation = agent.learner.networks.intentions(rows)
     coarse, fine = deviation.mean((0, 1)).tolist()
     self.assertBetween(coarse, 0.2, 0.6)
-    self.assertBetween(fine, 0.01, 0.06)
+    self.assertBetween(fine, 0.01, 0.1)
 
   @parameterized.parameters("squared_error", "likelihood")
   def test_a_prior_keeps_intentions_near_their_start_on_replayed_rows(
