@@ -68,11 +68,18 @@ class IntentionCloner:
     self._max_gradient_norm = max_gradient_norm
     self._dtype = product_dtype(bfloat16)
     self._loss = loss
+    self._schedule: torch.optim.lr_scheduler.LRScheduler | None = None
 
   def loss(self, batch: ExpertBatch) -> tuple[torch.Tensor, dict]:
     """The loss of a batch; see `cloning_loss`."""
     mean, deviation = self._network(batch.inputs.to(self._dtype))
     return cloning_loss(self._loss, mean, deviation, batch.action)
+
+  def anneal(self, updates: int) -> None:
+    """Lets the step size fall to 0 in so many updates, as a half cosine."""
+    self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+      self._optimiser, updates
+    )
 
   def update(self, batch: ExpertBatch) -> dict[str, torch.Tensor]:
     """Makes one update.
@@ -92,6 +99,8 @@ class IntentionCloner:
       clipped_step(
         self._optimiser, loss, self._parameters, self._max_gradient_norm
       )
+    if self._schedule is not None:
+      self._schedule.step()
     return metrics
 
   def state_dict(self) -> dict[str, Any]:

@@ -294,6 +294,7 @@ class LfgpAgent:
       config.bfloat16,
       config.bc_loss,
     )
+    cloner.anneal(config.bc_warm_start_updates)
     updates = tqdm.trange(
       1,
       config.bc_warm_start_updates + 1,

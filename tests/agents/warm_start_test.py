@@ -119,7 +119,7 @@ class CautiousStartTest(parameterized.TestCase):
       data.action[:, 1] = random.normal(0.2, 0.03, len(data.action))
     agent = build(
       LfgpConfig(
-        bc_warm_start_updates=500,
+        bc_warm_start_updates=1000,
         bc_loss="likelihood",
         bc_learning_rate=3e-3,
         hidden_size=16,
