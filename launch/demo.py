@@ -3,16 +3,19 @@
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
 This is what `make demo` runs. It ends in one table of success on the same
-resets (untrained agent, its warm start by behaviour cloning, trained agent, and
-the expert that it learned from), a figure and a video, in a new folder under
-runs/.
+resets (untrained agent, its warm start by behaviour cloning, trained agent, a
+stored policy that was trained for longer, and the expert that they learned
+from), a figure, and a video that ends with the stored policy, in a new folder
+under runs/.
 """
 
+import dataclasses
 import functools
 import pathlib
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import dm_env
 import numpy as np
@@ -20,6 +23,7 @@ from absl import flags
 
 from launch import actors, clips, command, config_flags, training
 from launch.configs import RunConfig
+from launch.worlds import World
 from lfgp_dmc import (
   evaluation,
   figures,
@@ -30,12 +34,20 @@ from lfgp_dmc import (
   video,
 )
 from lfgp_dmc.evaluation import EvaluationRow
+from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
 )
+_STORED = flags.DEFINE_string(
+  "stored",
+  "",
+  "A policy folder to show beside it; default: results/policies/TASK, if it is "
+  "there.",
+)
 _HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
 _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
+_POLICIES = pathlib.Path("results/policies")
 _CLIPS = 3  # intentions shown in the video
 _MOST_SECONDS = 8  # of each
 _EVERY = 2  # 50 ms a frame
@@ -48,6 +60,7 @@ def main() -> int:
   with command.checked_input():
     config = config_flags.resolved()
   path = pathlib.Path(_RUN.value) if _RUN.value else _default_path(config)
+  stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
   progress = training.train(config, path)
   if not progress.is_complete:
@@ -59,6 +72,7 @@ def main() -> int:
     "untrained": _evaluate_untrained(config),
     "warm start": [row for row in rows if row.env_step == 0],
     "trained": trained,
+    **({"stored": _evaluate_stored(config, stored)} if stored else {}),
     "expert": _evaluate_expert(config),
   }
   figure = figures.learning_curve(
@@ -66,7 +80,7 @@ def main() -> int:
     path / "learning_curve.png",
     f"{config.algorithm} on {config.main_task}".replace("_", " "),
   )
-  clip = _film(config, path, trained)
+  clip = _film(config, path, columns, stored)
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
   print(f"\n{shown}\n")
@@ -115,11 +129,47 @@ def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
   return _evaluate(config, expert)
 
 
-def _evaluate(config: RunConfig, make_actor) -> list[EvaluationRow]:
+def _stored_policy(main_task: str) -> actors.Cast | None:
+  """The policy to show beside the fresh one, if there is any.
+
+  Raises:
+    UserError: `--stored` names no policy that can do the task.
+  """
+  folder = _STORED.value or _POLICIES / main_task
+  if not _STORED.value and not pathlib.Path(folder).is_dir():
+    return None
+  cast = actors.find(str(folder), "")
+  if main_task not in cast.tasks:
+    raise command.UserError(
+      f"--stored={folder} cannot do {main_task}; it can do: "
+      f"{', '.join(cast.tasks)}"
+    )
+  return cast
+
+
+def _evaluate_stored(
+  config: RunConfig, stored: actors.Cast
+) -> list[EvaluationRow]:
+  print(f"evaluating {stored.folder} on the same resets", flush=True)
+  able = [t for t in task_names.task_set(config.main_task) if t in stored.tasks]
+  return _evaluate(config, stored.make, _world(config, stored), able)
+
+
+def _world(config: RunConfig, stored: actors.Cast) -> World:
+  """The run's environment, at the control rate of the stored policy."""
+  return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
+
+
+def _evaluate(
+  config: RunConfig,
+  make_actor: Callable[[], Actor],
+  world: World | None = None,
+  tasks: Sequence[str] = (),
+) -> list[EvaluationRow]:
   return evaluation.evaluate(
-    config.world.factory(show_rewards=True),
+    (world or config.world).factory(show_rewards=True),
     make_actor,
-    task_names.task_set(config.main_task),
+    tasks or task_names.task_set(config.main_task),
     config.evaluation_episodes,
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
@@ -127,21 +177,48 @@ def _evaluate(config: RunConfig, make_actor) -> list[EvaluationRow]:
 
 
 def _film(
-  config: RunConfig, path: pathlib.Path, trained: Sequence[EvaluationRow]
+  config: RunConfig,
+  path: pathlib.Path,
+  columns: Mapping[str, Sequence[EvaluationRow]],
+  stored: actors.Cast | None,
 ) -> pathlib.Path | None:
   """Renders evaluated episodes again: of the main task, then of others.
 
-  A success is shown where there was one.
+  Last comes the stored policy on the main task. A success is shown where there
+  was one.
   """
   if graphics.fault():
     return None
-  chosen = choose_episodes(config.main_task, trained)
-  environment = config.world.build()
-  actor = actors.stored_policy(str(path))
+  chosen = choose_episodes(config.main_task, columns["trained"])
+  frames = _play(config.world, actors.stored_policy(str(path)), chosen)
+  shown = [(path.name, row) for row in chosen]
+  if stored is not None:
+    best = choose_episodes(config.main_task, columns["stored"])[:1]
+    frames += _play(_world(config, stored), stored.make(), best)
+    shown += [(stored.name, row) for row in best]
+  return video.write(
+    path / "video.mp4",
+    frames,
+    _RATE / _EVERY,
+    {
+      "seed": config.evaluation_seed,
+      "episodes": [
+        {"actor": name, "task": row.task, "episode": row.episode}
+        for name, row in shown
+      ],
+    },
+  )
+
+
+def _play(
+  world: World, actor: Actor, episodes: Sequence[EvaluationRow]
+) -> list[np.ndarray]:
+  """The frames of evaluated episodes, played again."""
+  environment: Any = world.build()
   frames: list[np.ndarray] = []
-  for row in chosen:
+  for row in episodes:
     seed = seeding.derive(row.seed, "evaluation", row.episode)
-    environment.reseed(seed)  # type: ignore[attr-defined]
+    environment.reseed(seed)
     clip = clips.record(
       environment,
       actor,
@@ -149,17 +226,11 @@ def _film(
       functools.partial(_one_task, row.task),
       seed,
       clips.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
-      max_steps=_MOST_SECONDS * config.control_hz,
+      max_steps=_MOST_SECONDS * world.control_hz,
       until_success_of=row.task,
     )
     frames += clip.frames
-  shown = [{"task": row.task, "episode": row.episode} for row in chosen]
-  return video.write(
-    path / "video.mp4",
-    frames,
-    _RATE / _EVERY,
-    {"actor": path.name, "episodes": shown, "seed": config.evaluation_seed},
-  )
+  return frames
 
 
 def choose_episodes(

@@ -41,6 +41,7 @@ _BAD = (
   ("plot.py", "--runs is missing"),
   ("plot.py --runs=no/run", "no run folder no/run"),
   ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
+  ("demo.py --stored=missing", "no run folder missing"),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )
 
@@ -74,8 +75,10 @@ class DemoTest(absltest.TestCase):
   def test_collects_trains_and_leaves_table_figure_and_video(self):
     folder = pathlib.Path(self.create_tempdir().full_path)
     flagfile = _ROOT / "launch" / "flags" / "quickstart.flags"
+    stored = _ROOT / "results" / "policies" / "stack"
     done = _call(
       f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
+      f"--stored={stored} "
       "--config.collect_pairs=40 --config.env_steps=360 "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
@@ -84,7 +87,8 @@ class DemoTest(absltest.TestCase):
     )
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(
-      done.stdout, r"task +untrained +warm start +trained +expert\nstack"
+      done.stdout,
+      r"task +untrained +warm start +trained +stored +expert\nstack",
     )
     self.assertIn("total time", done.stdout)
     self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
