@@ -135,10 +135,10 @@ def _stored_policy(main_task: str) -> actors.Cast | None:
   Raises:
     UserError: `--stored` names no policy that can do the task.
   """
-  folder = _STORED.value or _POLICIES / main_task
+  folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
-  cast = actors.find(str(folder), "")
+  cast = actors.find(folder, "")
   if main_task not in cast.tasks:
     raise command.UserError(
       f"--stored={folder} cannot do {main_task}; it can do: "

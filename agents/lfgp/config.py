@@ -91,9 +91,7 @@ class LfgpConfig:
   prior_weight: float = 0.0  # stay near the first intentions, on all rows
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start; falls to 0, a cosine
-  cloned_deviation: float = (
-    0.0  # of actions after it; 0: left, 0.7 or as cloned
-  )
+  cloned_deviation: float = 0.0  # after it; 0: 0.7, or what was cloned
 
   # Other runs.
   init_from: str = ""  # policy folder whose intentions the actor starts from

@@ -2,7 +2,7 @@
 
 import torch
 
-from agents.networks.tanh_gaussian import log_one_minus_tanh_squared
+from agents.networks import tanh_gaussian
 
 Metrics = dict[str, torch.Tensor]
 
@@ -10,8 +10,6 @@ Metrics = dict[str, torch.Tensor]
 # what an expert does the same way each time has a deviation that goes to 0.
 MOST_ACTION = 0.95
 LEAST_DEVIATION = 0.018  # before the tanh
-
-_LOG_SQRT_2_PI = 0.9189385332046727
 
 
 def behaviour_cloning_loss(
@@ -55,13 +53,9 @@ def likelihood_loss(
   """
   deviation = deviation.clamp(min=LEAST_DEVIATION)
   value = torch.atanh(action.clamp(-MOST_ACTION, MOST_ACTION))
-  log_prob = (
-    -0.5 * ((value - mean) / deviation).square()
-    - deviation.log()
-    - _LOG_SQRT_2_PI
-    - log_one_minus_tanh_squared(value)
-  )
-  return _over_tasks(-log_prob.sum(-1).mean(-1), weight)
+  noise = (value - mean) / deviation
+  log_prob = tanh_gaussian.log_density(value, deviation, noise)
+  return _over_tasks(-log_prob.mean(-1), weight)
 
 
 def divergence_loss(
@@ -87,8 +81,9 @@ def divergence_loss(
     The weighted sum over tasks, and the unweighted divergence by task, in
     nats.
   """
-  ratio = deviation / prior_deviation.clamp(min=LEAST_DEVIATION)
-  shift = (mean - prior_mean) / prior_deviation.clamp(min=LEAST_DEVIATION)
+  prior_deviation = prior_deviation.clamp(min=LEAST_DEVIATION)
+  ratio = deviation / prior_deviation
+  shift = (mean - prior_mean) / prior_deviation
   divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
   return _over_tasks(divergence.sum(-1).mean(-1), weight)
 

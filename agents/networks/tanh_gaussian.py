@@ -14,6 +14,28 @@ def log_one_minus_tanh_squared(value: torch.Tensor) -> torch.Tensor:
   return 2.0 * (_LOG_2 - value - functional.softplus(-2.0 * value))
 
 
+def log_density(
+  value: torch.Tensor, deviation: torch.Tensor, noise: torch.Tensor
+) -> torch.Tensor:
+  """The log density of the actions tanh(value), summed over A.
+
+  Args:
+    value: [..., A], before the tanh.
+    deviation: [..., A], standard deviation, above 0.
+    noise: [..., A], (value - mean) / deviation.
+
+  Returns:
+    [...], in nats.
+  """
+  log_prob = (
+    -0.5 * noise * noise
+    - torch.log(deviation)
+    - _LOG_SQRT_2_PI
+    - log_one_minus_tanh_squared(value)
+  )
+  return log_prob.sum(-1)
+
+
 def sample(
   mean: torch.Tensor, deviation: torch.Tensor, noise: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
@@ -29,10 +51,4 @@ def sample(
     their log densities, [...].
   """
   value = mean + deviation * noise
-  log_prob = (
-    -0.5 * noise * noise
-    - torch.log(deviation)
-    - _LOG_SQRT_2_PI
-    - log_one_minus_tanh_squared(value)
-  )
-  return torch.tanh(value), log_prob.sum(-1)
+  return torch.tanh(value), log_density(value, deviation, noise)
