@@ -42,7 +42,13 @@ def _start(line: str, folder: str) -> subprocess.Popen:
     stdout=subprocess.PIPE,
     stderr=subprocess.PIPE,
     text=True,
+    # A shell's background job ignores SIGINT, and so would all it starts.
+    preexec_fn=_heed_interrupts,
   )
+
+
+def _heed_interrupts() -> None:
+  signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 class CollectDemonstrationsTest(absltest.TestCase):
