@@ -44,6 +44,7 @@ class Batch(NamedTuple):
   # int64 [B], where there are examples of success: the task that a row is an
   # example of, or -1 for a transition of the replay.
   owner: torch.Tensor | None = None
+  examples: int = 0  # how many of the last rows are examples
 
 
 def pooled_observations(
@@ -227,7 +228,9 @@ class ExpertPool:
       drawn = generator.standard_normal(state.shape, np.float32)
       return state + deviation * torch.from_numpy(drawn).to(self._device)
 
-    return Batch(disturbed(), self._action[at], disturbed(), owner=owner)
+    return Batch(
+      disturbed(), self._action[at], disturbed(), owner=owner, examples=rows
+    )
 
   def _split(self, rows: int) -> np.ndarray:
     """The task of each of `rows` rows: equal shares, the rest the main's."""

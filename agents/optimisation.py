@@ -17,12 +17,22 @@ def make_optimiser(
   learning_rate: float,
   weight_decay: float = 0.0,
 ) -> torch.optim.Optimizer:
-  """Adam with torch's defaults, or AdamW if there is a weight decay."""
+  """Adam with torch's defaults, or AdamW if there is a weight decay.
+
+  On a GPU its count of steps is there too, so that steps can be recorded.
+  """
+  on_device = parameters[0].is_cuda
   if weight_decay:
     return torch.optim.AdamW(
-      parameters, learning_rate, weight_decay=weight_decay, fused=True
+      parameters,
+      learning_rate,
+      weight_decay=weight_decay,
+      fused=True,
+      capturable=on_device,
     )
-  return torch.optim.Adam(parameters, learning_rate, fused=True)
+  return torch.optim.Adam(
+    parameters, learning_rate, fused=True, capturable=on_device
+  )
 
 
 def clipped_step(

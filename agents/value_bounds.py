@@ -29,8 +29,8 @@ class ValueBounds:
       discount: gamma.
       device: where to compute.
     """
-    self._rows = torch.zeros(window, 2, tasks, device=device)
-    self._count = 0
+    # The latest last; NaN for updates that have not been made yet.
+    self._rows = torch.full((window, 2, tasks), torch.nan, device=device)
     self._horizon = 1.0 / max(1.0 - discount, 1e-8)
 
   def of_rewards(
@@ -68,16 +68,13 @@ class ValueBounds:
     return -most[:, :1], torch.where(own, most, high[:, None])
 
   def state_dict(self) -> dict[str, Any]:
-    """The rows that the medians run over, and how many there were."""
-    return {"rows": self._rows.cpu().numpy().copy(), "count": self._count}
+    """The rows that the medians run over."""
+    return {"rows": self._rows.cpu().numpy().copy()}
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
     self._rows.copy_(torch.from_numpy(np.array(state["rows"])))
-    self._count = int(state["count"])
 
   def _median(self, latest: torch.Tensor) -> torch.Tensor:
-    window = len(self._rows)
-    self._rows[self._count % window] = latest
-    self._count += 1
-    return self._rows[: min(self._count, window)].quantile(0.5, dim=0)
+    self._rows.copy_(torch.cat([self._rows[1:], latest[None]]))
+    return self._rows.nanquantile(0.5, dim=0)

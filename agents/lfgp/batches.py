@@ -167,4 +167,5 @@ def with_examples(batch: Batch, examples: Batch) -> Batch:
   assert examples.owner is not None
   none = torch.full_like(examples.owner[:1], -1).repeat(len(batch.action))
   parts = map(torch.cat, zip(batch[:3], examples[:3], strict=True))
-  return Batch(*parts)._replace(owner=torch.cat([none, examples.owner]))
+  owner = torch.cat([none, examples.owner])
+  return Batch(*parts, owner=owner, examples=examples.examples)

@@ -16,6 +16,7 @@ from agents.lfgp.batches import Replay
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.learner import LfgpLearner
 from agents.lfgp.networks import make_networks
+from agents.lfgp.recording import CudaRecorder
 from agents.networks.trunk import Standardiser
 from agents.schedulers import make_scheduler
 from lfgp_dmc import seeding
@@ -75,5 +76,8 @@ def build(
     math.ceil(config.episode_steps / config.xi),
     seeding.generator(seed, "scheduler"),
   )
-  learner = LfgpLearner(config, networks, noise)
+  recorder = None
+  if device.type == "cuda" and config.cuda_graphs:
+    recorder = CudaRecorder(noise)
+  learner = LfgpLearner(config, networks, noise, recorder)
   return LfgpAgent(config, tasks, learner, scheduler, experts, replay, seed)

@@ -27,6 +27,11 @@ class CloningTerms:
     """Keeps what is needed."""
     self._config = config
     self._networks = networks
+    self._faded = torch.ones_like(networks.log_temperature[0].detach())
+
+  def fade(self, updates: int) -> None:
+    """Lets the weights fade to what they are after so many updates."""
+    self._faded.fill_(self._config.bc_decay**updates)
 
   def __call__(
     self,
@@ -35,7 +40,6 @@ class CloningTerms:
     mean: torch.Tensor,
     deviation: torch.Tensor,
     q: torch.Tensor,
-    updates: int,
   ) -> tuple[torch.Tensor | float, Metrics]:
     """Adds up the terms that the config asks for.
 
@@ -45,7 +49,6 @@ class CloningTerms:
       mean: [K, B, A], the intentions' means there, before the tanh.
       deviation: [K, B, A], their standard deviations, likewise.
       q: [2, K, B], the critics' values there; no gradient goes into them.
-      updates: how many were made before.
 
     Returns:
       Their sum, 0.0 if there is none, and metrics by task.
@@ -57,7 +60,7 @@ class CloningTerms:
       shown, shown_deviation = self._networks.intentions(
         expert.inputs.to(inputs.dtype)
       )
-      weight = self._weight(config.bc_weight, q, updates)
+      weight = self._weight(config.bc_weight, q)
       term, more = cloning.cloning_loss(
         config.bc_loss, shown, shown_deviation, expert.action, weight
       )
@@ -65,7 +68,7 @@ class CloningTerms:
     if self._networks.prior is not None:
       with torch.no_grad():
         wanted, wanted_deviation = self._networks.prior(inputs)
-      weight = self._weight(config.prior_weight, q, updates)
+      weight = self._weight(config.prior_weight, q)
       if config.bc_loss == cloning.LIKELIHOOD:
         term, more = divergence_loss(
           mean, deviation, wanted, wanted_deviation, weight
@@ -76,12 +79,10 @@ class CloningTerms:
       metrics["distance_from_prior"] = more["behaviour_cloning"]
     return loss, metrics
 
-  def _weight(
-    self, weight: float, q: torch.Tensor, updates: int
-  ) -> torch.Tensor:
+  def _weight(self, weight: float, q: torch.Tensor) -> torch.Tensor:
     """A term's weight in each task, [K]."""
-    config, q = self._config, q.detach()
-    weights = torch.full_like(q[0, :, 0], weight * config.bc_decay**updates)
-    if config.bc_normalise:
+    q = q.detach()
+    weights = torch.full_like(q[0, :, 0], weight) * self._faded
+    if self._config.bc_normalise:
       weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
     return weights

@@ -34,6 +34,7 @@ class LfgpConfig:
   fine_scale: float = 0.0  # c of inputs tanh(x / c) beside x (m); 0: none
   absorbing_flag: bool = False  # a last input, 0: no state is absorbing here
   bfloat16: bool = False  # products in bfloat16; parameters stay float32
+  cuda_graphs: bool = True  # on a GPU: updates recorded, then replayed
 
   # Intentions and critics.
   batch_size: int = 256
@@ -200,7 +201,7 @@ _SHARES = (
   "bc_decay scheduler_phi main_weight handcrafted_probability example_share"
 )
 _SWITCHES = (
-  "critic_layer_norm standardise bfloat16 bc_normalise "
+  "critic_layer_norm standardise bfloat16 cuda_graphs bc_normalise "
   "gradient_penalty_per_task absorbing_flag"
 )
 # What is valid -> names of fields; see `field_checks.py`.

@@ -1,7 +1,8 @@
 """One update of all networks, Algorithm 1 of the paper; torch alone."""
 
+import functools
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -9,10 +10,12 @@ from torch import nn
 
 from agents import serialisation
 from agents.experts import Batch, ExpertBatch
+from agents.lfgp.batches import Draw
 from agents.lfgp.cloning_terms import CloningTerms
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.discriminating import DiscriminatorLearner
 from agents.lfgp.networks import LfgpNetworks
+from agents.lfgp.recording import RecordedUpdates, Recorder
 from agents.losses.critic import (
   critic_loss,
   soft_bellman_target,
@@ -36,6 +39,14 @@ Metrics = dict[str, torch.Tensor]
 _SATURATED = 0.99
 
 
+class Phase(NamedTuple):
+  """What an update consists of."""
+
+  freezes_trunk: bool
+  trains_intentions: bool
+  trains_discriminator: bool
+
+
 class LfgpLearner:
   """Networks, optimisers and updates; batches are the caller's."""
 
@@ -44,6 +55,7 @@ class LfgpLearner:
     config: LfgpConfig,
     networks: LfgpNetworks,
     generator: torch.Generator,
+    recorder: Recorder | None = None,
   ):
     """Makes the optimisers.
 
@@ -51,6 +63,8 @@ class LfgpLearner:
       config: settings.
       networks: what to train.
       generator: on the networks' device, source of all noise.
+      recorder: records updates, which are then replayed; None: each update is
+        computed step by step.
     """
     self.networks = networks
     self.updates = 0
@@ -79,6 +93,7 @@ class LfgpLearner:
       )
       self._optimisers["discriminator"] = self._discriminator.optimiser
     self._cloning_terms = CloningTerms(config, networks)
+    self._recorded = RecordedUpdates(recorder) if recorder else None
     self._bounds = ValueBounds(
       len(networks.log_temperature),
       config.value_penalty_window,
@@ -105,26 +120,42 @@ class LfgpLearner:
     Returns:
       Detached tensors by the names above.
     """
+    if discriminator_batch is not None and expert is None:
+      raise ValueError("the discriminator's update needs expert pairs")
+    draw = Draw(batch, discriminator_batch, expert)
+    phase = Phase(
+      self.updates < self._config.freeze_updates,
+      self.updates >= self._config.intention_delay,
+      discriminator_batch is not None,
+    )
+    self._cloning_terms.fade(self.updates)
+    update = functools.partial(self._update, phase)
+    if self._recorded is None:
+      metrics = update(draw)
+    else:
+      metrics = self._recorded(update, draw, phase)
+    self.updates += 1
+    return metrics
+
+  def _update(self, phase: Phase, draw: Draw) -> Metrics:
+    """One update; it may be recorded, so only tensors change between two."""
     metrics: Metrics = {}
-    if discriminator_batch is not None:
-      if expert is None:
-        raise ValueError("the discriminator's update needs expert pairs")
+    batch, discriminator_batch, expert = draw
+    if discriminator_batch is not None and expert is not None:
       metrics |= self.update_discriminator(discriminator_batch, expert)
     inputs = batch.inputs
     if batch.owner is not None:  # intentions learn from the replay's rows
-      inputs = inputs[batch.owner < 0]
+      inputs = inputs[: len(inputs) - batch.examples]
       batch = self._with_fresh_actions(batch)
     trunk = self.networks.intentions.trunk
-    is_frozen = self.updates < self._config.freeze_updates
-    with frozen(list(trunk.parameters()) if is_frozen else []):
+    with frozen(list(trunk.parameters()) if phase.freezes_trunk else []):
       metrics |= self.update_critics(batch, self._rewards_of(batch))
-      if self.updates >= self._config.intention_delay:
+      if phase.trains_intentions:
         log_prob, more = self.update_intentions(inputs, expert)
         metrics |= more | self._update_temperatures(log_prob)
     polyak(
       self.networks.target_critics, self.networks.critics, self._config.polyak
     )
-    self.updates += 1
     return metrics
 
   def update_discriminator(self, batch: Batch, expert: ExpertBatch) -> Metrics:
@@ -164,12 +195,13 @@ class LfgpLearner:
   def _with_fresh_actions(self, batch: Batch) -> Batch:
     """Gives each example of success an action of its task's intention."""
     assert batch.owner is not None
-    at = torch.nonzero(batch.owner >= 0)[:, 0]
+    first = len(batch.action) - batch.examples
     with torch.no_grad():
-      inputs = batch.inputs[at].to(self._dtype)
+      inputs = batch.inputs[first:].to(self._dtype)
       action, _ = self._sample(*self.networks.intentions(inputs))
-    own = action[batch.owner[at], torch.arange(len(at), device=self._device)]
-    return batch._replace(action=batch.action.index_copy(0, at, own))
+    rows = torch.arange(batch.examples, device=self._device)
+    own = action[batch.owner[first:], rows]
+    return batch._replace(action=torch.cat([batch.action[:first], own]))
 
   def update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
     """One update of trunk and critics; reward [K, B]."""
@@ -233,9 +265,7 @@ class LfgpLearner:
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
-    terms, more = self._cloning_terms(
-      expert, inputs, mean, deviation, q, self.updates
-    )
+    terms, more = self._cloning_terms(expert, inputs, mean, deviation, q)
     loss, metrics = loss + terms, metrics | more
     norm = self._step("policy", loss, self._policy_parameters)
     saturated = (action.detach().abs() > _SATURATED).float()
