@@ -37,7 +37,12 @@ def carry_networks(
   carry_heads(networks.intentions, source["intentions"], *names, "intentions")
   carry_heads(networks.critics, source["critics"], *names, "critics")
   if networks.discriminator is not None and "discriminator" in source:
-    carry_discriminator(networks.discriminator, source["discriminator"], *names)
+    # A main task's own discriminator stays with its task.
+    ours = tasks[networks.main_discriminator is not None :]
+    theirs = source_tasks["main_discriminator" in source :]
+    carry_discriminator(
+      networks.discriminator, source["discriminator"], ours, theirs
+    )
   networks.target_critics.load_state_dict(networks.critics.state_dict())
 
 

@@ -65,6 +65,9 @@ class LfgpConfig:
   discriminator_batch_size: int = 256  # expert pairs a task
   discriminator_input: str = "state_action"  # or "state"
   discriminator_unseen: str = ""  # of an observation, such as 3:6,53:59
+  # If any, the main task has a discriminator of its own that does not see these
+  # (instead of those above).
+  main_discriminator_unseen: str = ""
   discriminator_noise: float = 0.0  # on observations, in deviations
   discriminator_every: int = 1  # updates between its updates
   discriminator_final_share: float = 0.0  # of expert pairs, rows of success
@@ -216,7 +219,8 @@ _RANGES = {
   "a number above 0, at most 1": "polyak scheduler_decay",
   "True or False": _SWITCHES,
   "a folder's name, or nothing": "init_from",
-  "slices of an observation, such as 3:6,53:59": "discriminator_unseen",
+  "slices of an observation, such as 3:6,53:59": "discriminator_unseen "
+  "main_discriminator_unseen",
 }
 _CHOICES: dict[str, tuple[str, ...]] = {
   "actor_trunk": ACTOR_TRUNKS,

@@ -4,6 +4,7 @@ import torch
 
 from agents.experts import Batch, ExpertBatch
 from agents.lfgp.config import LfgpConfig
+from agents.lfgp.networks import LfgpNetworks
 from agents.losses.discriminator import (
   discriminator_loss,
   gradient_penalty_loss,
@@ -16,8 +17,67 @@ from agents.rewards import reward_from_logits
 Metrics = dict[str, torch.Tensor]
 
 
+class Discriminating:
+  """The discriminators of all tasks: one network, or the main task's apart."""
+
+  def __init__(
+    self,
+    config: LfgpConfig,
+    networks: LfgpNetworks,
+    generator: torch.Generator,
+  ):
+    """Makes the optimisers, by the names of the networks.
+
+    Raises:
+      ValueError: there is no discriminator.
+    """
+    if networks.discriminator is None:
+      raise ValueError("there is no discriminator")
+    made = {"discriminator": networks.discriminator}
+    if networks.main_discriminator is not None:
+      made = {"main_discriminator": networks.main_discriminator} | made
+    parts = {
+      name: DiscriminatorLearner(config, network, generator)
+      for name, network in made.items()
+    }
+    self.optimisers = {name: part.optimiser for name, part in parts.items()}
+    self._parts = list(parts.values())
+    # How many of the K tasks each has, the main task's first.
+    self._sizes = [network.output.out_features for network in made.values()]
+
+  def update(self, batch: Batch, expert: ExpertBatch) -> Metrics:
+    """One update of each; see `LfgpLearner.update_discriminator`."""
+    groups = zip(
+      expert.inputs.split(self._sizes),
+      expert.action.split(self._sizes),
+      strict=True,
+    )
+    metrics = [
+      part.update(batch, ExpertBatch(*group))
+      for part, group in zip(self._parts, groups, strict=True)
+    ]
+    return metrics[0] if len(metrics) == 1 else self._joined(metrics)
+
+  def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
+    """Every task's reward [K, B] of inputs [B, O] and actions [B, A]."""
+    return torch.cat([part.rewards(inputs, action) for part in self._parts])
+
+  def _joined(self, metrics: list[Metrics]) -> Metrics:
+    """One after the other what differs by task; else the mean over tasks."""
+    joined = {}
+    for name in metrics[0]:
+      values = [part[name] for part in metrics]
+      if values[0].dim():
+        joined[name] = torch.cat(values)
+      else:
+        sizes = zip(values, self._sizes, strict=True)
+        total = torch.stack([value * size for value, size in sizes]).sum()
+        joined[name] = total / sum(self._sizes)
+    return joined
+
+
 class DiscriminatorLearner:
-  """Trains the discriminator network; its state is the caller's to store."""
+  """Trains one discriminator network; its state is the caller's to store."""
 
   def __init__(
     self,
@@ -44,7 +104,7 @@ class DiscriminatorLearner:
     self._dtype = product_dtype(config.bfloat16)
 
   def update(self, batch: Batch, expert: ExpertBatch) -> Metrics:
-    """One update, penalty included; see `LfgpLearner.update_discriminator`."""
+    """One update, penalty included, on the expert pairs of its own tasks."""
     config, network = self._config, self._network
     tasks, rows = expert.action.shape[:2]
     policy_pairs = network.join(self._disturb(batch.inputs), batch.action)
@@ -74,7 +134,7 @@ class DiscriminatorLearner:
     return metrics | more
 
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
-    """Every task's reward [K, B] of inputs [B, O] and actions [B, A]."""
+    """The reward of its tasks of inputs [B, O] and actions [B, A]."""
     config, network = self._config, self._network
     logits = network.logits(network.join(inputs, action).to(self._dtype))
     return reward_from_logits(

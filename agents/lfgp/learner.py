@@ -13,7 +13,7 @@ from agents.experts import Batch, ExpertBatch
 from agents.lfgp.batches import Draw
 from agents.lfgp.cloning_terms import CloningTerms
 from agents.lfgp.config import LfgpConfig
-from agents.lfgp.discriminating import DiscriminatorLearner
+from agents.lfgp.discriminating import Discriminating
 from agents.lfgp.networks import LfgpNetworks
 from agents.lfgp.recording import RecordedUpdates, Recorder
 from agents.losses.critic import (
@@ -86,12 +86,10 @@ class LfgpLearner:
         [networks.log_temperature], config.temperature_learning_rate
       ),
     }
-    self._discriminator = None
+    self._discriminating = None
     if networks.discriminator is not None:
-      self._discriminator = DiscriminatorLearner(
-        config, networks.discriminator, generator
-      )
-      self._optimisers["discriminator"] = self._discriminator.optimiser
+      self._discriminating = Discriminating(config, networks, generator)
+      self._optimisers |= self._discriminating.optimisers
     self._cloning_terms = CloningTerms(config, networks)
     self._recorded = RecordedUpdates(recorder) if recorder else None
     self._bounds = ValueBounds(
@@ -168,7 +166,8 @@ class LfgpLearner:
     Returns:
       The metrics of both losses.
     """
-    return self._discriminating().update(batch, expert)
+    assert self._discriminating is not None, "no discriminator"
+    return self._discriminating.update(batch, expert)
 
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Every task's reward by the current discriminator.
@@ -180,7 +179,8 @@ class LfgpLearner:
     Returns:
       [K, B], without gradient.
     """
-    return self._discriminating().rewards(inputs, action)
+    assert self._discriminating is not None, "no discriminator"
+    return self._discriminating.rewards(inputs, action)
 
   def _rewards_of(self, batch: Batch) -> torch.Tensor:
     """Every task's reward of a batch's rows, [K, B]."""
@@ -293,11 +293,6 @@ class LfgpLearner:
     self, mean: torch.Tensor, deviation: torch.Tensor
   ) -> tuple[torch.Tensor, torch.Tensor]:
     return tanh_gaussian.sample(mean, deviation, self._noise(mean))
-
-  def _discriminating(self) -> DiscriminatorLearner:
-    if self._discriminator is None:
-      raise ValueError("this learner has no discriminator")
-    return self._discriminator
 
   def _noise(self, like: torch.Tensor) -> torch.Tensor:
     return torch.randn(

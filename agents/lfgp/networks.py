@@ -25,9 +25,11 @@ class LfgpNetworks:
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  discriminator: Discriminator | None  # None: rewards come from elsewhere
+  # Of all tasks, or of all but the main task; None: no reward comes from it.
+  discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
   prior: IntentionNetwork | None = None  # the first intentions, frozen
+  main_discriminator: Discriminator | None = None  # the main task's, if apart
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
@@ -38,6 +40,8 @@ class LfgpNetworks:
     }
     if self.discriminator is not None:
       modules["discriminator"] = self.discriminator
+    if self.main_discriminator is not None:
+      modules["main_discriminator"] = self.main_discriminator
     if self.prior is not None:
       modules["prior"] = self.prior
     return modules
@@ -83,17 +87,27 @@ def make_networks(
     layouts.make_intention_heads(layout, *sizes, generator),
     config.owns_trunk,
   ).to(device)
-  discriminator = None
+  discriminator = main_discriminator = None
   if config.reward_source == "discriminator":
-    discriminator = Discriminator(
-      tasks,
-      observations,
-      actions,
-      hidden,
-      generator,
-      config.discriminator_input,
-      unseen_inputs(config.discriminator_unseen, standardiser),
-    ).to(device)
+
+    def make_discriminator(count: int, unseen: str) -> Discriminator:
+      return Discriminator(
+        count,
+        observations,
+        actions,
+        hidden,
+        generator,
+        config.discriminator_input,
+        unseen_inputs(unseen, standardiser),
+      ).to(device)
+
+    if config.main_discriminator_unseen:
+      main_discriminator = make_discriminator(
+        1, config.main_discriminator_unseen
+      )
+    discriminator = make_discriminator(
+      tasks - (main_discriminator is not None), config.discriminator_unseen
+    )
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,
@@ -102,6 +116,7 @@ def make_networks(
     discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
     prior=_frozen_copy(intentions) if config.prior_weight else None,
+    main_discriminator=main_discriminator,
   )
 
 
@@ -119,7 +134,8 @@ def unseen_inputs(slices: str, standardiser: Standardiser) -> list[int]:
   chosen = field_checks.positions(slices)
   if chosen and max(chosen) >= size:
     raise ValueError(
-      f"discriminator_unseen is {slices}; the observation has {size} floats"
+      f"unseen by a discriminator is {slices}; the observation has {size} "
+      "floats"
     )
   scales = 2 if standardiser.fine_scale else 1
   return [scale * size + at for scale in range(scales) for at in chosen]

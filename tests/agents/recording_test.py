@@ -157,6 +157,7 @@ class RecordingTest(parameterized.TestCase):
     {"expert_share": 0.5, "expert_share_decay": 0.9, "weight_decay": 0.01},
     {"reward_source": "examples", "value_penalty": 10.0, "bc_weight": 1.0},
     {"layout": "separate", "discriminator_input": "state"},
+    {"main_discriminator_unseen": "0:2"},
   )
   def test_replays_are_the_updates(self, **fields):
     recorder = self._compare(12, **fields)

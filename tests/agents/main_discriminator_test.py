@@ -1,0 +1,112 @@
+"""The main task's discriminator can be a network of its own."""
+
+import numpy as np
+import torch
+from absl.testing import absltest
+
+from agents import synthetic
+from agents.lfgp import LfgpConfig, build
+
+TASKS = ("main", "open_gripper", "reach")
+OBS, A, B = 6, 2, 16
+UNSEEN = "0:2"
+
+
+def _build(tasks=TASKS, **fields):
+  settings = {
+    "hidden_size": 16,
+    "batch_size": B,
+    "discriminator_batch_size": 8,
+    "discriminator_input": "state",
+    "main_discriminator_unseen": UNSEEN,
+  }
+  return build(
+    LfgpConfig(**(settings | fields)),
+    tasks,
+    synthetic.demonstrations(tasks, 100, OBS, A),
+    synthetic.ArrayReplay(synthetic.transitions(200, OBS, A)),
+    0,
+    "cpu",
+    OBS,
+    A,
+  )
+
+
+class MainDiscriminatorTest(absltest.TestCase):
+  def setUp(self):
+    super().setUp()
+    torch.set_num_threads(1)
+
+  def test_it_alone_does_not_see_what_is_hidden_from_it(self):
+    learner = _build(discriminator_unseen="3:4").learner
+    action = torch.zeros(OBS + 1, A)
+    changed = torch.cat([torch.zeros(1, OBS), torch.eye(OBS)])
+    rewards = learner.rewards(changed, action)
+    differs = (rewards[:, 1:] - rewards[:, :1]).abs() > 1e-6
+    main = [False, False, True, True, True, True]
+    others = [True, True, True, False, True, True]
+    self.assertEqual(differs.tolist(), [main, others, others])
+
+  def test_each_learns_from_its_own_tasks_pairs(self):
+    agent = _build(discriminator_learning_rate=1e-3)
+    for _ in range(200):
+      agent.update()
+    agent.metrics()
+    for _ in range(20):
+      agent.update()
+    metrics = agent.metrics()
+    for task in TASKS:
+      self.assertGreater(metrics[f"accuracy_expert/{task}"], 0.85)
+      self.assertGreater(metrics[f"accuracy_policy/{task}"], 0.85)
+
+  def test_metrics_are_means_over_tasks(self):
+    agent = _build()
+    draw = agent.batches.draw(0)
+    parts = agent.learner._discriminating._parts
+    joined = agent.learner._discriminating._joined(
+      [
+        {"loss": torch.tensor(1.0), "reward": torch.tensor([5.0])},
+        {"loss": torch.tensor(4.0), "reward": torch.tensor([6.0, 7.0])},
+      ]
+    )
+    self.assertLen(parts, 2)
+    self.assertEqual(joined["loss"].item(), 3.0)
+    self.assertEqual(joined["reward"].tolist(), [5.0, 6.0, 7.0])
+    metrics = agent.learner.update(*draw)
+    self.assertEqual(metrics["accuracy_policy"].shape, (3,))
+
+  def test_a_checkpoint_brings_both_back(self):
+    agent, other = _build(), _build()
+    for _ in range(3):
+      agent.update()
+    other.load_state_dict(agent.state_dict())
+    for _ in range(2):
+      agent.update()
+      other.update()
+    rows = torch.ones(2, OBS), torch.ones(2, A)
+    np.testing.assert_array_equal(
+      agent.learner.rewards(*rows), other.learner.rewards(*rows)
+    )
+
+  def test_transfer_carries_the_other_tasks_over(self):
+    for fields in ({}, {"main_discriminator_unseen": ""}):
+      source = _build(("old", "reach", "open_gripper"), **fields)
+      agent = _build()
+      own = agent.learner.networks
+      kept = own.main_discriminator.output.weight.clone()
+      state = source.learner.state_dict()["networks"]
+      agent.carry_over(state, source.tasks)
+      index = list(source.tasks).index("reach") - bool(not fields)
+      np.testing.assert_array_equal(
+        own.discriminator.output.weight[1].detach(),
+        state["discriminator"]["output.weight"][index],
+      )
+      self.assertTrue(torch.equal(own.main_discriminator.output.weight, kept))
+
+  def test_floats_that_are_not_there_are_refused(self):
+    with self.assertRaisesRegex(ValueError, "5:9; the observation has 6"):
+      _build(main_discriminator_unseen="5:9")
+
+
+if __name__ == "__main__":
+  absltest.main()
