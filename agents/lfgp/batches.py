@@ -120,7 +120,7 @@ class BatchMaker:
     if not expert_rows:
       return batch
     expert = self._pool().sample_transitions(self.generator, expert_rows)
-    return Batch(*map(torch.cat, zip(batch[:3], expert[:3], strict=True)))
+    return _joined(batch, expert)
 
   def _transitions(self, rows: int) -> Batch:
     """Transitions of the replay, with their rewards if those are used."""
@@ -166,6 +166,15 @@ def with_examples(batch: Batch, examples: Batch) -> Batch:
   """Transitions of the replay, then examples of success, with owners."""
   assert examples.owner is not None
   none = torch.full_like(examples.owner[:1], -1).repeat(len(batch.action))
-  parts = map(torch.cat, zip(batch[:3], examples[:3], strict=True))
-  owner = torch.cat([none, examples.owner])
-  return Batch(*parts, owner=owner, examples=examples.examples)
+  return _joined(batch, examples)._replace(
+    owner=torch.cat([none, examples.owner]), examples=examples.examples
+  )
+
+
+def _joined(one: Batch, other: Batch) -> Batch:
+  """Both batches' transitions, one after the other."""
+  return Batch(
+    torch.cat([one.inputs, other.inputs]),
+    torch.cat([one.action, other.action]),
+    torch.cat([one.next_inputs, other.next_inputs]),
+  )

@@ -48,16 +48,16 @@ class MainDiscriminatorTest(absltest.TestCase):
     self.assertEqual(differs.tolist(), [main, others, others])
 
   def test_each_learns_from_its_own_tasks_pairs(self):
-    agent = _build(discriminator_learning_rate=1e-3)
-    for _ in range(200):
+    agent = _build(discriminator_learning_rate=3e-3)
+    for _ in range(300):
       agent.update()
     agent.metrics()
     for _ in range(20):
       agent.update()
     metrics = agent.metrics()
     for task in TASKS:
-      self.assertGreater(metrics[f"accuracy_expert/{task}"], 0.85)
-      self.assertGreater(metrics[f"accuracy_policy/{task}"], 0.85)
+      self.assertGreater(metrics[f"accuracy_expert/{task}"], 0.9)
+      self.assertGreater(metrics[f"accuracy_policy/{task}"], 0.7)
 
   def test_metrics_are_means_over_tasks(self):
     agent = _build()
