@@ -6,37 +6,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import torch
-from torch import nn
 
 from agents import serialisation
 from agents.experts import Batch, ExpertBatch
 from agents.lfgp.batches import Draw
-from agents.lfgp.cloning_terms import CloningTerms
 from agents.lfgp.config import LfgpConfig
-from agents.lfgp.discriminating import Discriminating
+from agents.lfgp.critic_learner import CriticLearner
+from agents.lfgp.discriminator_learner import DiscriminatorLearner
+from agents.lfgp.intention_learner import IntentionLearner
 from agents.lfgp.networks import LfgpNetworks
 from agents.lfgp.recording import RecordedUpdates, Recorder
-from agents.losses.critic import (
-  critic_loss,
-  soft_bellman_target,
-  value_penalty_loss,
-)
-from agents.losses.intention import intention_loss
-from agents.losses.temperature import temperature_loss
-from agents.networks import tanh_gaussian
-from agents.optimisation import (
-  clipped_step,
-  frozen,
-  make_optimiser,
-  polyak,
-  product_dtype,
-)
+from agents.optimisation import frozen, polyak
 from agents.rewards import bounded, reward_from_examples
-from agents.value_bounds import ValueBounds
 
 Metrics = dict[str, torch.Tensor]
-
-_SATURATED = 0.99
 
 
 class Phase(NamedTuple):
@@ -57,7 +40,7 @@ class LfgpLearner:
     generator: torch.Generator,
     recorder: Recorder | None = None,
   ):
-    """Makes the optimisers.
+    """Makes the learners of the parts.
 
     Args:
       config: settings.
@@ -70,34 +53,17 @@ class LfgpLearner:
     self.updates = 0
     self._config = config
     self._generator = generator
-    self._device = networks.log_temperature.device
-    self._dtype = product_dtype(config.bfloat16)
-    self._critic_parameters = list(networks.critics.parameters())
-    self._policy_parameters = networks.intentions.trained_parameters()
-    decay = config.weight_decay
-    self._optimisers = {
-      "critic": make_optimiser(
-        self._critic_parameters, config.critic_learning_rate, decay
-      ),
-      "policy": make_optimiser(
-        self._policy_parameters, config.intention_learning_rate, decay
-      ),
-      "temperature": make_optimiser(
-        [networks.log_temperature], config.temperature_learning_rate
-      ),
-    }
-    self._discriminating = None
-    if networks.discriminator is not None:
-      self._discriminating = Discriminating(config, networks, generator)
-      self._optimisers |= self._discriminating.optimisers
-    self._cloning_terms = CloningTerms(config, networks)
     self._recorded = RecordedUpdates(recorder) if recorder else None
-    self._bounds = ValueBounds(
-      len(networks.log_temperature),
-      config.value_penalty_window,
-      config.discount,
-      self._device,
-    )
+    self.critics = CriticLearner(config, networks, generator)
+    self.intentions = IntentionLearner(config, networks, generator)
+    self._optimisers = {
+      "critic": self.critics.optimiser,
+      **self.intentions.optimisers,
+    }
+    self.discriminators = None  # None: rewards come from elsewhere
+    if networks.discriminator is not None:
+      self.discriminators = DiscriminatorLearner(config, networks, generator)
+      self._optimisers |= self.discriminators.optimisers
 
   def update(
     self,
@@ -116,7 +82,11 @@ class LfgpLearner:
         may be None if neither is wanted.
 
     Returns:
-      Detached tensors by the names above.
+      Detached tensors by the names in `metric_names.py`; with a recorder, the
+      next update overwrites them.
+
+    Raises:
+      ValueError: the discriminator is to be updated without expert pairs.
     """
     if discriminator_batch is not None and expert is None:
       raise ValueError("the discriminator's update needs expert pairs")
@@ -126,7 +96,7 @@ class LfgpLearner:
       self.updates >= self._config.intention_delay,
       discriminator_batch is not None,
     )
-    self._cloning_terms.fade(self.updates)
+    self.intentions.fade(self.updates)
     update = functools.partial(self._update, phase)
     if self._recorded is None:
       metrics = update(draw)
@@ -140,34 +110,21 @@ class LfgpLearner:
     metrics: Metrics = {}
     batch, discriminator_batch, expert = draw
     if discriminator_batch is not None and expert is not None:
-      metrics |= self.update_discriminator(discriminator_batch, expert)
+      assert self.discriminators is not None, "no discriminator"
+      metrics |= self.discriminators.update(discriminator_batch, expert)
     inputs = batch.inputs
     if batch.owner is not None:  # intentions learn from the replay's rows
       inputs = inputs[: len(inputs) - batch.examples]
-      batch = self._with_fresh_actions(batch)
+      batch = self.intentions.with_fresh_actions(batch)
     trunk = self.networks.intentions.trunk
     with frozen(list(trunk.parameters()) if phase.freezes_trunk else []):
-      metrics |= self.update_critics(batch, self._rewards_of(batch))
+      metrics |= self.critics.update(batch, self.rewards_of(batch))
       if phase.trains_intentions:
-        log_prob, more = self.update_intentions(inputs, expert)
-        metrics |= more | self._update_temperatures(log_prob)
+        metrics |= self.intentions.update(inputs, expert)
     polyak(
       self.networks.target_critics, self.networks.critics, self._config.polyak
     )
     return metrics
-
-  def update_discriminator(self, batch: Batch, expert: ExpertBatch) -> Metrics:
-    """One update of the discriminator, penalty included.
-
-    Args:
-      batch: transitions of the replay.
-      expert: each task's own pairs, [K, N, ...].
-
-    Returns:
-      The metrics of both losses.
-    """
-    assert self._discriminating is not None, "no discriminator"
-    return self._discriminating.update(batch, expert)
 
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Every task's reward by the current discriminator.
@@ -179,11 +136,11 @@ class LfgpLearner:
     Returns:
       [K, B], without gradient.
     """
-    assert self._discriminating is not None, "no discriminator"
-    return self._discriminating.rewards(inputs, action)
+    assert self.discriminators is not None, "no discriminator"
+    return self.discriminators.rewards(inputs, action)
 
-  def _rewards_of(self, batch: Batch) -> torch.Tensor:
-    """Every task's reward of a batch's rows, [K, B]."""
+  def rewards_of(self, batch: Batch) -> torch.Tensor:
+    """Every task's reward of a batch's rows, [K, B], by `reward_source`."""
     config = self._config
     if batch.owner is not None:
       tasks = len(self.networks.log_temperature)
@@ -191,113 +148,6 @@ class LfgpLearner:
     if batch.reward is not None:
       return bounded(batch.reward, config.reward_clip, config.reward_scale)
     return self.rewards(batch.inputs, batch.action)
-
-  def _with_fresh_actions(self, batch: Batch) -> Batch:
-    """Gives each example of success an action of its task's intention."""
-    assert batch.owner is not None
-    first = len(batch.action) - batch.examples
-    with torch.no_grad():
-      inputs = batch.inputs[first:].to(self._dtype)
-      action, _ = self._sample(*self.networks.intentions(inputs))
-    rows = torch.arange(batch.examples, device=self._device)
-    own = action[batch.owner[first:], rows]
-    return batch._replace(action=torch.cat([batch.action[:first], own]))
-
-  def update_critics(self, batch: Batch, reward: torch.Tensor) -> Metrics:
-    """One update of trunk and critics; reward [K, B]."""
-    networks, config = self.networks, self._config
-    with torch.no_grad():
-      next_inputs = batch.next_inputs.to(self._dtype)
-      mean, deviation = networks.intentions(next_inputs)
-      action, log_prob = self._sample(mean, deviation)
-      next_q = networks.target_critics(next_inputs, action)
-      target = soft_bellman_target(
-        reward,
-        next_q,
-        log_prob,
-        networks.log_temperature.exp(),
-        config.discount,
-      )
-    q = networks.critics(batch.inputs.to(self._dtype), batch.action)
-    mask = None
-    if batch.owner is not None:  # an example serves its own task alone
-      tasks = torch.arange(len(reward), device=self._device)[:, None]
-      mask = ((batch.owner < 0) | (batch.owner == tasks)).float()
-    loss, metrics = critic_loss(q, target, mask)
-    if config.value_penalty > 0:
-      low, high = self._value_bounds(batch, reward, q[0].detach())
-      penalty, more = value_penalty_loss(
-        q, low, high, config.value_penalty, mask
-      )
-      loss = loss + penalty
-      metrics |= more
-    norm = self._step("critic", loss, self._critic_parameters)
-    return metrics | {
-      "gradient_norm/critic": norm,
-      "reward": reward.mean(1),
-      "q_bound": reward.abs().amax(1) / (1 - config.discount + 1e-8),
-    }
-
-  def _value_bounds(
-    self, batch: Batch, reward: torch.Tensor, q: torch.Tensor
-  ) -> tuple[torch.Tensor, torch.Tensor]:
-    """The least and greatest possible values, [K, 1] and [K, 1] or [K, B]."""
-    if batch.owner is None:
-      return self._bounds.of_rewards(reward)
-    tasks = torch.arange(len(reward), device=self._device)[:, None]
-    scale = self._config.reward_scale
-    return self._bounds.of_examples(q, batch.owner == tasks, scale)
-
-  def update_intentions(
-    self, inputs: torch.Tensor, expert: ExpertBatch | None
-  ) -> tuple[torch.Tensor, Metrics]:
-    """Returns the new actions' log densities [K, B], and metrics."""
-    networks = self.networks
-    inputs = inputs.to(self._dtype)
-    with frozen(self._critic_parameters):
-      critic_features = networks.critics.trunk(inputs)
-      features = critic_features
-      if networks.intentions.owns_trunk:
-        features = networks.intentions.trunk(inputs)
-      mean, deviation = networks.intentions.heads(features)
-      action, log_prob = self._sample(mean, deviation)
-      q = networks.critics.heads(critic_features, action)
-    loss, metrics = intention_loss(
-      log_prob, q, networks.log_temperature.detach().exp()
-    )
-    terms, more = self._cloning_terms(expert, inputs, mean, deviation, q)
-    loss, metrics = loss + terms, metrics | more
-    norm = self._step("policy", loss, self._policy_parameters)
-    saturated = (action.detach().abs() > _SATURATED).float()
-    return log_prob.detach(), metrics | {
-      "gradient_norm/policy": norm,
-      "saturation": saturated.mean((1, 2)),
-    }
-
-  def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
-    parameter = self.networks.log_temperature
-    loss, metrics = temperature_loss(
-      parameter, log_prob, self._config.target_entropy
-    )
-    norm = self._step("temperature", loss, [parameter])
-    return metrics | {"gradient_norm/temperature": norm}
-
-  def _step(
-    self, name: str, loss: torch.Tensor, parameters: list[nn.Parameter]
-  ) -> torch.Tensor:
-    return clipped_step(
-      self._optimisers[name], loss, parameters, self._config.max_gradient_norm
-    )
-
-  def _sample(
-    self, mean: torch.Tensor, deviation: torch.Tensor
-  ) -> tuple[torch.Tensor, torch.Tensor]:
-    return tanh_gaussian.sample(mean, deviation, self._noise(mean))
-
-  def _noise(self, like: torch.Tensor) -> torch.Tensor:
-    return torch.randn(
-      like.shape, generator=self._generator, device=self._device
-    )
 
   def adopt_intention_trunk(self) -> None:
     """Copies the intentions' trunk into critics and targets, if it is to be.
@@ -332,7 +182,7 @@ class LfgpLearner:
         for name, optimiser in self._optimisers.items()
       },
       "generator": serialisation.torch_generator_state(self._generator),
-      "bounds": self._bounds.state_dict(),
+      "bounds": self.critics.state_dict(),
       "updates": self.updates,
     }
 
@@ -353,5 +203,5 @@ class LfgpLearner:
     serialisation.load_torch_generator_state(
       self._generator, state["generator"]
     )
-    self._bounds.load_state_dict(state["bounds"])
+    self.critics.load_state_dict(state["bounds"])
     self.updates = int(state["updates"])

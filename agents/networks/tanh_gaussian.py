@@ -52,3 +52,11 @@ def sample(
   """
   value = mean + deviation * noise
   return torch.tanh(value), log_density(value, deviation, noise)
+
+
+def draw(
+  mean: torch.Tensor, deviation: torch.Tensor, generator: torch.Generator
+) -> tuple[torch.Tensor, torch.Tensor]:
+  """Draws the noise too; see `sample`."""
+  noise = torch.randn(mean.shape, generator=generator, device=mean.device)
+  return sample(mean, deviation, noise)

@@ -116,12 +116,14 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
 def time_shares(agent, seconds: float) -> dict[str, float]:
   """How an update's time is divided: part -> share; `rest` is all else."""
   spent: dict[str, float] = {}
+  learner = agent.learner
   parts = {
     "sampling": (agent.batches, "draw"),
-    "discriminator": (agent.learner, "update_discriminator"),
-    "critics": (agent.learner, "update_critics"),
-    "intentions": (agent.learner, "update_intentions"),
+    "critics": (learner.critics, "update"),
+    "intentions": (learner.intentions, "update"),
   }
+  if learner.discriminators is not None:
+    parts["discriminator"] = (learner.discriminators, "update")
 
   def timed(part: str, call: Callable) -> Callable:
     def wrapped(*arguments):

@@ -100,7 +100,7 @@ class WhatMovesTest(parameterized.TestCase):
     learner = _make(actor_trunk=trunk, critic_learning_rate=STILL)
     learner.update(_batch(), _batch(1), _expert())
     learner.networks.critics.zero_grad()
-    learner.update_intentions(_batch().inputs, None)
+    learner.intentions.update(_batch().inputs, None)
     for parameter in learner.networks.critics.parameters():
       self.assertIsNone(parameter.grad)
       self.assertTrue(parameter.requires_grad)

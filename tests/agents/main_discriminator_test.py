@@ -62,8 +62,8 @@ class MainDiscriminatorTest(absltest.TestCase):
   def test_metrics_are_means_over_tasks(self):
     agent = _build()
     draw = agent.batches.draw(0)
-    parts = agent.learner._discriminating._parts
-    joined = agent.learner._discriminating._joined(
+    parts = agent.learner.discriminators._parts
+    joined = agent.learner.discriminators._joined(
       [
         {"loss": torch.tensor(1.0), "reward": torch.tensor([5.0])},
         {"loss": torch.tensor(4.0), "reward": torch.tensor([6.0, 7.0])},

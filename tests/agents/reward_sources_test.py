@@ -79,7 +79,7 @@ class StoredRewardsTest(absltest.TestCase):
       shown={}, reward_source="replay", reward_clip=0.5, reward_scale=0.1
     )
     batch = agent.batches.draw(0).batch
-    reward = agent.learner._rewards_of(batch)
+    reward = agent.learner.rewards_of(batch)
     torch.testing.assert_close(reward, 0.1 * batch.reward.clamp(-0.5, 0.5))
     self.assertAlmostEqual(reward.abs().max().item(), 0.05, places=6)
 
@@ -157,7 +157,7 @@ class ExamplesTest(parameterized.TestCase):
       for task in range(len(TASKS)):
         heads.output.bias[task, :, :A] = task
     before = agent.batches.draw(0).batch
-    after = learner._with_fresh_actions(before)
+    after = learner.intentions.with_fresh_actions(before)
     kept = before.owner < 0
     torch.testing.assert_close(after.action[kept], before.action[kept])
     expected = torch.tanh(before.owner[~kept].float())[:, None].expand(-1, A)
@@ -198,7 +198,9 @@ class ExamplesTest(parameterized.TestCase):
     for _ in range(300):
       agent.update()
     metrics = agent.metrics()
-    batch = agent.learner._with_fresh_actions(agent.batches.draw(0).batch)
+    batch = agent.learner.intentions.with_fresh_actions(
+      agent.batches.draw(0).batch
+    )
     q = agent.learner.networks.critics(batch.inputs, batch.action)[0]
     for task in range(len(TASKS)):
       own = q[task][batch.owner == task].mean().item()

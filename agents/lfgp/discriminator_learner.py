@@ -17,7 +17,7 @@ from agents.rewards import reward_from_logits
 Metrics = dict[str, torch.Tensor]
 
 
-class Discriminating:
+class DiscriminatorLearner:
   """The discriminators of all tasks: one network, or the main task's apart."""
 
   def __init__(
@@ -37,7 +37,7 @@ class Discriminating:
     if networks.main_discriminator is not None:
       made = {"main_discriminator": networks.main_discriminator} | made
     parts = {
-      name: DiscriminatorLearner(config, network, generator)
+      name: _NetworkLearner(config, network, generator)
       for name, network in made.items()
     }
     self.optimisers = {name: part.optimiser for name, part in parts.items()}
@@ -46,7 +46,15 @@ class Discriminating:
     self._sizes = [network.output.out_features for network in made.values()]
 
   def update(self, batch: Batch, expert: ExpertBatch) -> Metrics:
-    """One update of each; see `LfgpLearner.update_discriminator`."""
+    """One update of each network.
+
+    Args:
+      batch: transitions of the replay.
+      expert: each task's own pairs, [K, N, ...].
+
+    Returns:
+      The metrics of both losses.
+    """
     groups = zip(
       expert.inputs.split(self._sizes),
       expert.action.split(self._sizes),
@@ -76,8 +84,8 @@ class Discriminating:
     return joined
 
 
-class DiscriminatorLearner:
-  """Trains one discriminator network; its state is the caller's to store."""
+class _NetworkLearner:
+  """Trains one discriminator network."""
 
   def __init__(
     self,
