@@ -37,7 +37,7 @@ class Recorder(Protocol):
 
 
 class CudaRecorder:
-  """Records on the current CUDA device."""
+  """Records on the generator's CUDA device."""
 
   def __init__(self, generator: torch.Generator):
     """Keeps the one source of random numbers in an update.
@@ -46,11 +46,11 @@ class CudaRecorder:
       generator: on the device; replays go on with its stream.
     """
     self._generator = generator
-    self._stream = torch.cuda.Stream()
+    self._stream = torch.cuda.Stream(generator.device)
 
   def warm_up(self, update: Update, /) -> Metrics:
-    """Makes an update on a stream apart from the default one."""
-    current = torch.cuda.current_stream()
+    """Makes an update on the stream that it will be recorded on."""
+    current = torch.cuda.current_stream(self._generator.device)
     self._stream.wait_stream(current)
     with torch.cuda.stream(self._stream):
       metrics = update()
@@ -61,7 +61,7 @@ class CudaRecorder:
     """Records a CUDA graph."""
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(self._generator)
-    with torch.cuda.graph(graph):
+    with torch.cuda.graph(graph, stream=self._stream):
       metrics = update()
     return metrics, graph.replay
 
