@@ -10,6 +10,9 @@ Metrics = dict[str, torch.Tensor]
 # what an expert does the same way each time has a deviation that goes to 0.
 MOST_ACTION = 0.95
 LEAST_DEVIATION = 0.018  # before the tanh
+# Of the divergence: a policy that explores may be as precise as the prior down
+# to here, or its samples fail where its mean succeeds.
+LEAST_COMPARED = 0.003
 
 
 def behaviour_cloning_loss(
@@ -67,23 +70,24 @@ def divergence_loss(
 ) -> tuple[torch.Tensor, Metrics]:
   """KL(pi || prior), mean over rows, all tasks equal.
 
-  That of two Gaussians, as the tanh of both changes nothing.
+  That of two Gaussians, as the tanh of both changes nothing. Where the prior is
+  more precise than `LEAST_DEVIATION`, the means' distance counts in units of that,
+  so that the intention can still move; deviations are compared as they are, down
+  to `LEAST_COMPARED`.
 
   Args:
     mean: [K, N, A], before the tanh.
     deviation: [K, N, A], likewise.
     prior_mean: [K, N, A], of what to stay near.
-    prior_deviation: [K, N, A], likewise; below `LEAST_DEVIATION` it counts as
-      that.
+    prior_deviation: [K, N, A], likewise.
     weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
 
   Returns:
     The weighted sum over tasks, and the unweighted divergence by task, in
     nats.
   """
-  prior_deviation = prior_deviation.clamp(min=LEAST_DEVIATION)
-  ratio = deviation / prior_deviation
-  shift = (mean - prior_mean) / prior_deviation
+  ratio = deviation / prior_deviation.clamp(min=LEAST_COMPARED)
+  shift = (mean - prior_mean) / prior_deviation.clamp(min=LEAST_DEVIATION)
   divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
   return _over_tasks(divergence.sum(-1).mean(-1), weight)
 

@@ -175,6 +175,23 @@ class PolicyLossesTest(absltest.TestCase):
       metrics["behaviour_cloning"], expected.sum(-1).mean(-1)
     )
 
+  def test_divergence_from_a_prior_that_is_very_precise(self):
+    # Means: (0.009 / 0.018)^2 = 0.25. Deviations: as precise as the prior, then
+    # (0.006 / 0.003)^2 = 4 with ln 2, the prior's own being less than 0.003.
+    for deviation, prior_deviation, by_hand in (
+      (0.01, 0.01, 0.125),
+      (0.006, 0.0001, 0.5 * (4.0 + 0.25 - 1.0) - math.log(2.0)),
+    ):
+      _, metrics = behaviour_cloning.divergence_loss(
+        torch.tensor([[[0.009]]]),
+        torch.tensor([[[deviation]]]),
+        torch.zeros(1, 1, 1),
+        torch.tensor([[[prior_deviation]]]),
+      )
+      self.assertAlmostEqual(
+        metrics["behaviour_cloning"].item(), by_hand, places=5
+      )
+
 
 class TanhGaussianTest(absltest.TestCase):
   def test_log_density(self):
