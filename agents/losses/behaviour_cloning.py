@@ -70,10 +70,10 @@ def divergence_loss(
 ) -> tuple[torch.Tensor, Metrics]:
   """KL(pi || prior), mean over rows, all tasks equal.
 
-  That of two Gaussians, as the tanh of both changes nothing. Where the prior is
-  more precise than `LEAST_DEVIATION`, the means' distance counts in units of that,
-  so that the intention can still move; deviations are compared as they are, down
-  to `LEAST_COMPARED`.
+  That of two Gaussians, as the tanh of both changes nothing. Where the prior
+  is more precise than `LEAST_DEVIATION`, the means' distance counts in units
+  of that, so that the intention can still move; deviations are compared as
+  they are, down to `LEAST_COMPARED`.
 
   Args:
     mean: [K, N, A], before the tanh.
