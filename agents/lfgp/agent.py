@@ -5,15 +5,16 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import torch
 import tqdm
+from absl import logging
 
 from agents import serialisation
-from agents.cloning import IntentionCloner
-from agents.experts import (
-  ExpertPool,
-)
+from agents.cloning import LIKELIHOOD, IntentionCloner
+from agents.experts import ExpertPool
 from agents.lfgp import carrying
 from agents.lfgp.batches import BatchMaker, Replay, reward_columns
+from agents.lfgp.cloning_terms import entropies
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.learner import LfgpLearner
 from agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
@@ -23,6 +24,7 @@ from agents.schedulers import Scheduler, period_returns
 from lfgp_dmc import seeding
 from lfgp_dmc.types import Episode, Metrics, Period
 
+_ENTROPY_ROWS = 1024  # a task
 _CLONING_LOG_EVERY = 1000  # warm-start updates between readings of its loss
 
 
@@ -146,6 +148,8 @@ class LfgpAgent:
     if self._config.bc_warm_start_updates:
       self._warm_start(progress_bar)
     self.learner.adopt_prior()
+    if self._config.prior_weight and self._config.bc_loss == LIKELIHOOD:
+      self._warn_of_precise_prior()
     for _ in tqdm.trange(
       self._first_updates,
       desc="on the other run's replay",
@@ -275,6 +279,27 @@ class LfgpAgent:
         f"{what} has none of {', '.join(self.tasks)}; it has: "
         f"{', '.join(source_tasks)}"
       )
+
+  def _warn_of_precise_prior(self) -> None:
+    """Names the tasks whose prior lacks the entropy that is asked for."""
+    assert self._experts is not None, "there is a prior"
+    rows = self._experts.sample(np.random.default_rng(0), _ENTROPY_ROWS).inputs
+    noise = torch.Generator(rows.device).manual_seed(0)
+    network, target = (
+      self.learner.networks.intentions,
+      self._config.target_entropy,
+    )
+    values = entropies(network, rows, noise).tolist()
+    for task, value in zip(self.tasks, values, strict=True):
+      if value < target:
+        logging.warning(
+          "the intention of %s starts with an entropy of %.1f nats, and its "
+          "prior holds it there; target_entropy is %.1f, so that its "
+          "temperature will grow without bound: choose a lower one",
+          task,
+          value,
+          target,
+        )
 
   def _refresh_inputs(self) -> None:
     """After the standardiser has changed."""

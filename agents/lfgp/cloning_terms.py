@@ -10,6 +10,8 @@ from agents.losses.behaviour_cloning import (
   behaviour_cloning_loss,
   divergence_loss,
 )
+from agents.networks import tanh_gaussian
+from agents.networks.intentions import IntentionNetwork
 
 Metrics = dict[str, torch.Tensor]
 
@@ -86,3 +88,22 @@ class CloningTerms:
     if self._config.bc_normalise:
       weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
     return weights
+
+
+@torch.no_grad()
+def entropies(
+  network: IntentionNetwork, inputs: torch.Tensor, generator: torch.Generator
+) -> torch.Tensor:
+  """Estimates each intention's entropy where it is at home.
+
+  Args:
+    network: the intentions.
+    inputs: [K, N, O], rows of each task's own.
+    generator: source of the samples.
+
+  Returns:
+    [K], mean -log pi, in nats.
+  """
+  mean, deviation = network(inputs)
+  _, log_prob = tanh_gaussian.draw(mean, deviation, generator)
+  return -log_prob.mean(-1)

@@ -1,11 +1,15 @@
 """Starts from cloned behaviour, and whether it is kept."""
 
+from unittest import mock
+
 import numpy as np
 import torch
+from absl import logging
 from absl.testing import absltest, parameterized
 
 from agents import synthetic
 from agents.lfgp import LfgpConfig, build
+from agents.lfgp.cloning_terms import entropies
 from agents.policy import Policy
 from lfgp_dmc import collection, environments, evaluation, loop, metrics, toy
 from lfgp_dmc.collection_attempts import Plan
@@ -281,6 +285,31 @@ class KeptSuccessTest(absltest.TestCase):
       progress=False,
     )
     return evaluation.success_rates(rows)
+
+
+class PrecisePriorTest(absltest.TestCase):
+  def test_too_high_a_target_entropy_is_told_of_by_task(self):
+    fields = {"bc_loss": "likelihood", "prior_weight": 0.1}
+    for deviation, tasks in ((0.01, list(TASKS)), (1.0, [])):
+      agent = _build(target_entropy=-2.0, actor_trunk="own", **fields)
+      agent.learner.networks.intentions.heads.set_deviation(deviation)
+      with mock.patch.object(logging, "warning") as warning:
+        agent.prepare()
+      self.assertEqual([call.args[1] for call in warning.mock_calls], tasks)
+
+  def test_entropy_by_hand(self):
+    agent = _build()
+    network = agent.learner.networks.intentions
+    network.heads.set_deviation(0.01)
+    with torch.no_grad():
+      network.heads.output.weight[..., :A] = 0.0
+      network.heads.output.bias[..., :A] = 0.0
+    found = entropies(
+      network, torch.zeros(len(TASKS), 20_000, OBS), torch.Generator()
+    )
+    # A Gaussian's, 0.5 ln(2 pi e) + ln 0.01 a float; the tanh is straight here.
+    by_hand = A * (1.418939 - 4.605170)
+    np.testing.assert_allclose(found, by_hand, atol=0.02)
 
 
 if __name__ == "__main__":
