@@ -9,6 +9,7 @@ from launch.command import UserError
 from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import demonstrations, published_examples
 from lfgp_dmc.demonstrations import Demonstrations
+from tasks import mirror
 
 _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 
@@ -40,6 +41,20 @@ def load(
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
     raise UserError(f"{error}{hint}") from None
+  found = _counted(config, found)
+  if config.mirror_demonstrations:
+    found = mirror.with_images(found)
+  return found
+
+
+def _counted(
+  config: RunConfig, found: dict[str, Demonstrations]
+) -> dict[str, Demonstrations]:
+  """As many pairs a task as the config says, the first ones.
+
+  Raises:
+    UserError: a task has fewer.
+  """
   if not config.pairs_per_task:
     return found
   short = [
@@ -49,7 +64,8 @@ def load(
   ]
   if short:
     raise UserError(
-      f"config.pairs_per_task is {config.pairs_per_task}; {folder} has fewer "
+      f"config.pairs_per_task is {config.pairs_per_task}; "
+      f"{config.demonstrations} has fewer "
       f"pairs of {', '.join(short)}"
     )
   return {

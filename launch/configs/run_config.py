@@ -24,6 +24,7 @@ class RunConfig:
   # Demonstrations.
   demonstrations: str = ""  # dataset folder: a file a task
   pairs_per_task: int = 0  # use the first so many of each file; 0: all
+  mirror_demonstrations: bool = False  # and as many mirror images of them
   collect_pairs: int = 0  # collect so many a task if there is no folder
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
@@ -74,6 +75,11 @@ class RunConfig:
     if not self.environment and self.main_task not in ALL_TASKS:
       faults.append(
         f"config.main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
+      )
+    if self.environment and self.mirror_demonstrations:
+      faults.append(
+        "config.mirror_demonstrations is True; valid: False with "
+        "config.environment (only the block tasks' mirror image is known)"
       )
     if self.control_hz not in CONTROL_RATES:
       faults.append(

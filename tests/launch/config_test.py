@@ -86,6 +86,12 @@ class ConfigTest(parameterized.TestCase):
         self.assertIn(message, str(error))
         raise ValueError("") from None
 
+  def test_only_the_block_tasks_have_mirror_images(self):
+    images = "--config.mirror_demonstrations"
+    self.assertTrue(resolve(images).mirror_demonstrations)
+    with self.assertRaisesRegex(ValueError, "mirror_demonstrations is True"):
+      resolve(images, "--config.environment=package.module:factory")
+
   def test_a_value_of_another_type_is_a_flag_error(self):
     with self.assertRaises(flags.IllegalFlagValueError):
       resolve("--config.seed=many")

@@ -262,6 +262,22 @@ class ExamplesTest(_RunTest):
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
     self._train(config, "a", resume=True)
 
+  def test_mirror_images_double_what_was_shown(self):
+    dataset = fixtures.write_dataset(
+      self.folder / "shown", ("stack", "move_object"), 59, 4, pairs=20
+    )
+    for mirror, pairs in ((False, 15), (True, 30)):
+      config = fixtures.small_config(
+        dataset,
+        environment="",
+        main_task="stack",
+        mirror_demonstrations=mirror,
+        pairs_per_task=15,
+      )
+      shown = datasets.load(config, ["stack", "move_object"], (59, 4))
+      self.assertLen(shown["stack"], pairs)
+      self.assertLen(shown["move_object"], 15)
+
   def test_published_examples_are_read_like_a_dataset(self):
     data = pathlib.Path(__file__).parents[1] / "data"
     folder = self.folder / "examples"
