@@ -31,6 +31,12 @@ _FINALS = flags.DEFINE_integer(
   "Extra pairs a task: the row of success of so many further attempts. The "
   "journal version's 1000 pairs: --pairs_per_task=800 --final_pairs=200.",
 )
+_LONGEST = flags.DEFINE_integer(
+  "longest_of",
+  1,
+  "Of so many attempts keep the longest: starts that take more doing are shown "
+  "more often. With --collection=reset.",
+)
 _SEED = flags.DEFINE_integer("seed", 0, "Everything random follows from it.")
 _OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
 _EXPERT = flags.DEFINE_string(
@@ -78,6 +84,7 @@ def main() -> int:
     all_tasks,
     _SEED.value,
     _HERTZ.value,
+    longest_of=_LONGEST.value,
   )
   try:
     found = collection.collect(
@@ -92,9 +99,12 @@ def main() -> int:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
   _write(output, found)
   print(f"{demonstrations.summary_table(_data(found))}\n")
+  what = "attempts"
+  if _LONGEST.value > 1:
+    what = f"choices of {_LONGEST.value} attempts"
   for task, (_, attempts, successes) in found.items():
     print(
-      f"{task:<16}{successes} of {attempts} attempts succeeded "
+      f"{task:<16}{successes} of {attempts} {what} succeeded "
       f"({successes / attempts:.1%})"
     )
   print(f"wrote {output}")
@@ -108,6 +118,12 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
   command.check_least("final_pairs", _FINALS.value, 0)
+  command.check_least("longest_of", _LONGEST.value, 1)
+  if _LONGEST.value > 1 and _COLLECTION.value != "reset":
+    raise command.UserError(
+      f"--longest_of={_LONGEST.value}; valid: 1 with --collection=play (its "
+      "attempts follow from one another)"
+    )
   command.check_least("seed", _SEED.value, 0)
   command.check_least("workers", _WORKERS.value, 0)
   valid = lfgp_dmc.task_set(_TASK.value)

@@ -43,6 +43,8 @@ class Plan:
     control_hz: control steps a second.
     play_steps: steps at 20 Hz between resets in play-based collection.
     limits: task -> most steps at 20 Hz of an attempt, where not `LIMIT`.
+    longest_of: of so many reset-based attempts the longest is kept, so that
+      the starts that take more doing are shown more often.
   """
 
   make_environment: Callable[[str], dm_env.Environment]
@@ -53,6 +55,7 @@ class Plan:
   control_hz: int = 20
   play_steps: int = 360
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
+  longest_of: int = 1
 
   def steps(self, at_20_hz: int) -> int:
     """The same time in control steps, rounded up."""
@@ -98,7 +101,15 @@ class Collector:
     task, numbers = job
     if task is None:
       return task, [attempt for i in numbers for attempt in self._play(i)]
-    return task, [self._attempt_from_reset(task, i) for i in numbers]
+    return task, [self._longest(task, i) for i in numbers]
+
+  def _longest(self, task: str, number: int) -> Attempt:
+    """The longest successful one of the plan's so many; or a failed one."""
+    count = self._plan.longest_of
+    made = [
+      self._attempt_from_reset(task, count * number + i) for i in range(count)
+    ]
+    return max(made, key=lambda a: 0 if a.rows is None else len(a.rows.action))
 
   def _attempt_from_reset(self, task: str, number: int) -> Attempt:
     """Resets, takes the lead of Open- or Close-Gripper, then tries."""

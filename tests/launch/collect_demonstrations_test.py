@@ -26,6 +26,8 @@ _BAD = (
   ("--output=new --collection=film", "valid: reset, play"),
   ("--output=new --pairs_per_task=0", "--pairs_per_task=0; valid: 1 or more"),
   ("--output=new --final_pairs=-1", "--final_pairs=-1; valid: 0 or more"),
+  ("--output=new --longest_of=0", "--longest_of=0; valid: 1 or more"),
+  ("--output=new --longest_of=2 --collection=play", "valid: 1 with"),
   ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),
   ("--output=new --seed=-1", "--seed=-1; valid: 0 or more"),
   ("--output=new --workers=-1", "--workers=-1; valid: 0 or more"),

@@ -78,6 +78,20 @@ class CollectTest(parameterized.TestCase):
         data.observation[1:][inside], data.next_observation[:-1][inside]
       )
 
+  def test_of_several_attempts_the_longest_is_kept(self):
+    one, three = Collector(_plan()), Collector(_plan(longest_of=3))
+    _, every = one(("right", range(30)))
+    _, kept = three(("right", range(10)))
+    lengths = [len(attempt.rows.action) for attempt in every]
+    self.assertGreater(len(set(lengths)), 1)
+    self.assertEqual(
+      [len(attempt.rows.action) for attempt in kept],
+      [max(lengths[i : i + 3]) for i in range(0, 30, 3)],
+    )
+    failing = Collector(_plan(_RightOnly, longest_of=2))
+    _, (failed,) = failing(("left", [0]))
+    self.assertIsNone(failed.rows)
+
   @parameterized.parameters("reset", "play")
   def test_an_attempt_that_is_cut_has_no_last_row(self, kind):
     whole = _collect(_plan(), kind, pairs=50)["right"].demonstrations
