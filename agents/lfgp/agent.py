@@ -5,16 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import torch
 import tqdm
-from absl import logging
 
-from agents import serialisation
-from agents.cloning import LIKELIHOOD, IntentionCloner
+from agents import cloning, serialisation
 from agents.experts import ExpertPool
-from agents.lfgp import carrying
+from agents.lfgp import carrying, warm_start
 from agents.lfgp.batches import BatchMaker, Replay, reward_columns
-from agents.lfgp.cloning_terms import entropies
 from agents.lfgp.config import LfgpConfig
 from agents.lfgp.learner import LfgpLearner
 from agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
@@ -23,9 +19,6 @@ from agents.policy import Policy
 from agents.schedulers import Scheduler, period_returns
 from lfgp_dmc import seeding
 from lfgp_dmc.types import Episode, Metrics, Period
-
-_ENTROPY_ROWS = 1024  # a task
-_CLONING_LOG_EVERY = 1000  # warm-start updates between readings of its loss
 
 
 class LfgpAgent:
@@ -145,11 +138,19 @@ class LfgpAgent:
     """
     if self._has_started:
       return
-    if self._config.bc_warm_start_updates:
-      self._warm_start(progress_bar)
+    config, intentions = self._config, self.learner.networks.intentions
+    if config.bc_warm_start_updates:
+      assert self._experts is not None, "a warm start needs demonstrations"
+      warm_start.clone(
+        config, intentions, self._experts, self._sampling, progress_bar
+      )
+      self.learner.adopt_intention_trunk()
     self.learner.adopt_prior()
-    if self._config.prior_weight and self._config.bc_loss == LIKELIHOOD:
-      self._warn_of_precise_prior()
+    if config.prior_weight and config.bc_loss == cloning.LIKELIHOOD:
+      assert self._experts is not None, "the likelihood needs demonstrations"
+      warm_start.warn_of_precise_prior(
+        config, self.tasks, intentions, self._experts
+      )
     for _ in tqdm.trange(
       self._first_updates,
       desc="on the other run's replay",
@@ -280,61 +281,7 @@ class LfgpAgent:
         f"{', '.join(source_tasks)}"
       )
 
-  def _warn_of_precise_prior(self) -> None:
-    """Names the tasks whose prior lacks the entropy that is asked for."""
-    assert self._experts is not None, "there is a prior"
-    rows = self._experts.sample(np.random.default_rng(0), _ENTROPY_ROWS).inputs
-    noise = torch.Generator(rows.device).manual_seed(0)
-    network, target = (
-      self.learner.networks.intentions,
-      self._config.target_entropy,
-    )
-    values = entropies(network, rows, noise).tolist()
-    for task, value in zip(self.tasks, values, strict=True):
-      if value < target:
-        logging.warning(
-          "the intention of %s starts with an entropy of %.1f nats, and its "
-          "prior holds it there; target_entropy is %.1f, so that its "
-          "temperature will grow without bound: choose a lower one",
-          task,
-          value,
-          target,
-        )
-
   def _refresh_inputs(self) -> None:
     """After the standardiser has changed."""
     if self._experts is not None:
       self._experts.refresh()
-
-  def _warm_start(self, progress_bar: bool) -> None:
-    """Pure behaviour cloning; then the critics start from its trunk."""
-    config, intentions = self._config, self.learner.networks.intentions
-    assert self._experts is not None, "a warm start needs demonstrations"
-    intentions.owns_trunk = True  # cloning trains it, whosever it is later
-    cloner = IntentionCloner(
-      intentions,
-      config.bc_learning_rate,
-      config.weight_decay,
-      config.max_gradient_norm,
-      config.bfloat16,
-      config.bc_loss,
-    )
-    cloner.anneal(config.bc_warm_start_updates)
-    updates = tqdm.trange(
-      1,
-      config.bc_warm_start_updates + 1,
-      desc="warm start",
-      unit="update",
-      disable=not progress_bar,
-    )
-    for update in updates:
-      metrics = cloner.update(
-        self._experts.sample(self._sampling, config.batch_size)
-      )
-      if update % _CLONING_LOG_EVERY == 0:
-        loss = float(metrics["loss/behaviour_cloning"])
-        updates.set_postfix(loss=f"{loss:.4f}")
-    intentions.owns_trunk = config.owns_trunk
-    if config.cloned_deviation:  # the squared error says nothing of it
-      intentions.heads.set_deviation(config.cloned_deviation)
-    self.learner.adopt_intention_trunk()
