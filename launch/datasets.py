@@ -9,7 +9,6 @@ from launch.command import UserError
 from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import demonstrations, published_examples
 from lfgp_dmc.demonstrations import Demonstrations
-from tasks import mirror
 
 _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 
@@ -43,6 +42,9 @@ def load(
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
   if config.mirror_demonstrations:
+    # The room of the tasks imports MuJoCo, whose backend is chosen before.
+    from tasks import mirror
+
     found = mirror.with_images(found)
   return found
 
