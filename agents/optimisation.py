@@ -21,17 +21,13 @@ def make_optimiser(
 
   On a GPU its count of steps is there too, so that steps can be recorded.
   """
-  on_device = parameters[0].is_cuda
-  if weight_decay:
-    return torch.optim.AdamW(
-      parameters,
-      learning_rate,
-      weight_decay=weight_decay,
-      fused=True,
-      capturable=on_device,
-    )
-  return torch.optim.Adam(
-    parameters, learning_rate, fused=True, capturable=on_device
+  kind = torch.optim.AdamW if weight_decay else torch.optim.Adam
+  return kind(
+    parameters,
+    learning_rate,
+    weight_decay=weight_decay,
+    fused=True,
+    capturable=parameters[0].is_cuda,
   )
 
 

@@ -146,8 +146,10 @@ class LfgpAgent:
       )
       self.learner.adopt_intention_trunk()
     self.learner.adopt_prior()
-    if config.prior_weight and config.bc_loss == cloning.LIKELIHOOD:
-      assert self._experts is not None, "the likelihood needs demonstrations"
+    has_precise_prior = (
+      config.prior_weight > 0 and config.bc_loss == cloning.LIKELIHOOD
+    )
+    if has_precise_prior and self._experts is not None:
       warm_start.warn_of_precise_prior(
         config, self.tasks, intentions, self._experts
       )

@@ -87,27 +87,9 @@ def make_networks(
     layouts.make_intention_heads(layout, *sizes, generator),
     config.owns_trunk,
   ).to(device)
-  discriminator = main_discriminator = None
-  if config.reward_source == "discriminator":
-
-    def make_discriminator(count: int, unseen: str) -> Discriminator:
-      return Discriminator(
-        count,
-        observations,
-        actions,
-        hidden,
-        generator,
-        config.discriminator_input,
-        unseen_inputs(unseen, standardiser),
-      ).to(device)
-
-    if config.main_discriminator_unseen:
-      main_discriminator = make_discriminator(
-        1, config.main_discriminator_unseen
-      )
-    discriminator = make_discriminator(
-      tasks - (main_discriminator is not None), config.discriminator_unseen
-    )
+  main_discriminator, discriminator = _make_discriminators(
+    config, tasks, actions, standardiser, generator, device
+  )
   initial = torch.tensor(config.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,
@@ -118,6 +100,37 @@ def make_networks(
     prior=_frozen_copy(intentions) if config.prior_weight else None,
     main_discriminator=main_discriminator,
   )
+
+
+def _make_discriminators(
+  config: LfgpConfig,
+  tasks: int,
+  actions: int,
+  standardiser: Standardiser,
+  generator: torch.Generator,
+  device: torch.device,
+) -> tuple[Discriminator | None, Discriminator | None]:
+  """The main task's own, if it has one, and that of all other tasks."""
+  if config.reward_source != "discriminator":
+    return None, None
+
+  def make(count: int, unseen: str) -> Discriminator:
+    return Discriminator(
+      count,
+      standardiser.input_size,
+      actions,
+      config.hidden_size,
+      generator,
+      config.discriminator_input,
+      unseen_inputs(unseen, standardiser),
+    ).to(device)
+
+  if not config.main_discriminator_unseen:
+    return None, make(tasks, config.discriminator_unseen)
+  if tasks == 1:  # there are no others to be apart from
+    return None, make(1, config.main_discriminator_unseen)
+  main = make(1, config.main_discriminator_unseen)
+  return main, make(tasks - 1, config.discriminator_unseen)
 
 
 def unseen_inputs(slices: str, standardiser: Standardiser) -> list[int]:

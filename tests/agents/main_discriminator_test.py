@@ -47,6 +47,15 @@ class MainDiscriminatorTest(absltest.TestCase):
     others = [True, True, True, False, True, True]
     self.assertEqual(differs.tolist(), [main, others, others])
 
+  def test_a_task_alone_has_one_that_does_not_see_it_either(self):
+    agent = _build(TASKS[:1])
+    agent.update()
+    self.assertTrue(np.isfinite(agent.metrics()["loss/discriminator"]))
+    rewards = agent.learner.rewards(torch.eye(OBS), torch.zeros(OBS, A))
+    self.assertEqual(rewards.shape, (1, OBS))
+    self.assertAlmostEqual(rewards[0, 0].item(), rewards[0, 1].item(), places=6)
+    self.assertNotAlmostEqual(rewards[0, 0].item(), rewards[0, 2].item())
+
   def test_each_learns_from_its_own_tasks_pairs(self):
     agent = _build(discriminator_learning_rate=3e-3)
     for _ in range(300):

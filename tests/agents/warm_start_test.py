@@ -297,6 +297,28 @@ class PrecisePriorTest(absltest.TestCase):
         agent.prepare()
       self.assertEqual([call.args[1] for call in warning.mock_calls], tasks)
 
+  def test_a_prior_without_demonstrations_is_not_asked_for_its_entropy(self):
+    rows = synthetic.transitions(50, OBS, A)
+    rewards = np.zeros((50, len(TASKS)), np.float32)
+    agent = build(
+      LfgpConfig(
+        reward_source="replay",
+        bc_loss="likelihood",
+        prior_weight=0.1,
+        hidden_size=16,
+      ),
+      TASKS,
+      {},
+      synthetic.ArrayReplay(rows, rewards, TASKS),
+      0,
+      "cpu",
+      OBS,
+      A,
+    )
+    agent.prepare()
+    agent.update()
+    self.assertIn("distance_from_prior/stack", agent.metrics())
+
   def test_entropy_by_hand(self):
     agent = _build()
     network = agent.learner.networks.intentions
