@@ -13,7 +13,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from launch.command import UserError
+from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
 _POLL = 0.2  # s

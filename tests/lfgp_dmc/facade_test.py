@@ -35,14 +35,14 @@ class FacadeTest(parameterized.TestCase):
 
   def test_load_passes_everything_on(self):
     tasks = types.SimpleNamespace(load=mock.Mock(return_value="environment"))
-    with mock.patch.dict(sys.modules, {"tasks": tasks}):
+    with mock.patch.dict(sys.modules, {"lfgp_dmc.tasks": tasks}):
       made = lfgp_dmc.load("stack", seed=3, reward="dense")
     self.assertEqual(made, "environment")
     tasks.load.assert_called_once_with("stack", seed=3, reward="dense")
 
   def test_load_policy_acts_for_the_named_task(self):
     agents = types.SimpleNamespace(Policy=_Policy)
-    with mock.patch.dict(sys.modules, {"agents.policy": agents}):
+    with mock.patch.dict(sys.modules, {"lfgp_dmc.agents.policy": agents}):
       main = lfgp_dmc.load_policy("runs/a")
       reach = lfgp_dmc.load_policy("runs/a", "reach")
       with self.assertRaisesRegex(ValueError, "'lift'; it has: stack, reach"):
