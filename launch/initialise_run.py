@@ -12,7 +12,7 @@ from lfgp_dmc.runs.run_folder import RunFolder
 
 
 def start(config: RunConfig, agent: Any, replay: Replay | None) -> None:
-  """Carries over what `transfer_from` and `agent.init_from` name.
+  """Carries over what `transfer_from` and `init_from` name.
 
   Args:
     config: of the new run.
@@ -29,13 +29,16 @@ def start(config: RunConfig, agent: Any, replay: Replay | None) -> None:
         f"config.transfer_from is {config.transfer_from!r}; valid: nothing, "
         f"since {config.algorithm} keeps no replay"
       )
-    _transfer(RunFolder(pathlib.Path(config.transfer_from)), agent, replay)
-  if init_from := getattr(config.agent, "init_from", ""):
-    agent.start_from(Policy.load(init_from))
-    print(f"the intentions start as those of {init_from}")
+    source = RunFolder(pathlib.Path(config.transfer_from))
+    _transfer(source, agent, replay, config.transfer_updates)
+  if config.init_from:
+    agent.start_from(Policy.load(config.init_from))
+    print(f"the intentions start as those of {config.init_from}")
 
 
-def _transfer(source: RunFolder, agent: Any, replay: Replay) -> None:
+def _transfer(
+  source: RunFolder, agent: Any, replay: Replay, updates: int
+) -> None:
   """Section 5.2 of the paper: networks by task name, and the whole replay."""
   try:
     tasks = run_folder.read_config(source.path)["policy"]["tasks"]
@@ -50,7 +53,7 @@ def _transfer(source: RunFolder, agent: Any, replay: Replay) -> None:
     ) from None
   except ValueError as error:
     raise ValueError(f"config.transfer_from: {error}") from None
-  agent.carry_over(networks, tasks)
+  agent.carry_over(networks, tasks, updates)
   rows = carry_replay(StoredReplay(source.replay), replay)
   print(f"took over {path.name} of {source.path} with {rows} transitions")
 

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from typing import Any
 
 import dm_env
 import numpy as np
@@ -107,10 +108,9 @@ def _scheduled(cast: policies.Cast, seed: int) -> Switch:
     if name not in run_folder.ADDED_FIELDS
   }
   try:
-    agent = configs.from_dict(stored).agent
-    periods = -(-agent.episode_steps // agent.xi)
+    agent: Any = configs.from_dict(stored).agent
     scheduler = make_scheduler(
-      agent, cast.tasks, 0, periods, np.random.default_rng(seed)
+      agent.scheduler, cast.tasks, np.random.default_rng(seed)
     )
   except ValueError as error:
     raise UserError(f"{cast.folder}: {error}") from None
@@ -123,7 +123,7 @@ def _scheduled(cast: policies.Cast, seed: int) -> Switch:
 
   def choose(step: int, timestep: dm_env.TimeStep) -> str:
     nonlocal chosen
-    if step % agent.xi == 0:
+    if step % agent.scheduler.xi == 0:
       chosen = cast.tasks[scheduler.next_task()]
     return chosen
 

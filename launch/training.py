@@ -268,13 +268,14 @@ def _open_replay(
   reward_tasks: tuple[str, ...],
 ) -> Replay:
   # A full ring must still hold the rows of the last checkpoint.
-  episode = getattr(config.agent, "episode_steps", 0)
   is_ring = config.replay_capacity < config.env_steps or config.transfer_from
   return Replay(
     config.replay_capacity,
     *widths,
     run.replay,
-    slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+    slack=config.checkpoint_every + 2 * config.most_episode_steps
+    if is_ring
+    else 0,
     reward_tasks=reward_tasks,
   )
 
@@ -301,6 +302,9 @@ def _build_agent(config, tasks, shown, replay, device, widths):
     seeding.derive(config.seed, "agent"),
     device,
     *widths,
+    random_steps=config.random_steps,
+    bfloat16=config.bfloat16,
+    cuda_graphs=config.cuda_graphs,
   )
 
 
@@ -317,12 +321,12 @@ def _write_policy(
 
 
 def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
-  pace = {}
+  pace: dict[str, Any] = {}
   if not ALGORITHMS[config.algorithm].is_supervised:
-    pace["warmup_steps"] = config.agent.warm_up
+    pace["warmup_steps"] = config.warm_up
     if config.transfer_from:  # there is a replay from the start
-      pace["warmup_steps"] = min(config.agent.warm_up, config.agent.batch_size)
-    pace["updates_per_step"] = config.agent.updates_per_step
+      pace["warmup_steps"] = min(config.warm_up, config.agent.batch_size)
+    pace["updates_per_step"] = config.updates_per_step
   return loop.TrainSchedule(
     env_steps=config.env_steps,
     log_every=config.log_every,

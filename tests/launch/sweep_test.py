@@ -46,8 +46,7 @@ class SweepTest(absltest.TestCase):
     self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.flags = self.folder / "flags"
     self.flags.mkdir()
-    for stem in ("lfgp_stack", "lfgp_bring", "lfgp_transfer_stack",
-                 "lfgp_move_object"):  # fmt: skip
+    for stem in ("lfgp", "lfgp_transfer"):
       (self.flags / f"{stem}.flags").touch()
 
   def _jobs(self, algorithms, seeds=(0,), starts=(), arguments=()):
@@ -77,6 +76,7 @@ class SweepTest(absltest.TestCase):
     self.assertEqual(states["lfgp_stack_0"], "waiting")
     self.assertContainsSubset(
       ["--config.seed=7", f"--x={self.folder}/7",
+       f"--flagfile={self.flags}/lfgp.flags", "--config.main_task=stack",
        f"--run={self.folder}/lfgp_stack_7"],
       jobs[names.index("lfgp_stack_7")].train_arguments(),
     )  # fmt: skip
@@ -165,22 +165,21 @@ class CommandTest(absltest.TestCase):
       "--config.algorithm=lfgp",
       f"--config.demonstrations={dataset}",
       f"--config.environment={fixtures.POINT}",
-      "--config.main_task=right",
       "--config.agent.batch_size=8",
-      "--config.agent.discriminator_batch_size=8",
-      "--config.agent.hidden_size=16",
-      "--config.agent.episode_steps=20",
-      "--config.agent.warm_up=20",
-      "--config.agent.xi=5",
+      "--config.agent.networks.hidden_size=16",
+      "--config.agent.reward.batch_size=8",
+      "--config.agent.scheduler.xi=5",
+      "--config.episode_steps=20",
+      "--config.warm_up=20",
       "--config.checkpoint_every=40",
       "--config.env_steps=3000",
-      "--config.agent.updates_per_step=0.1",
+      "--config.updates_per_step=0.1",
       "--config.evaluate_every=3000",
       "--config.evaluation_episodes=2",
       "--config.evaluation_workers=1",
       "--config.replay_capacity=100000",
     ]
-    (flags / "lfgp_toy.flags").write_text("\n".join(lines))
+    (flags / "lfgp.flags").write_text("\n".join(lines))
 
   def _start(self, *arguments) -> subprocess.Popen:
     return subprocess.Popen(
@@ -188,7 +187,7 @@ class CommandTest(absltest.TestCase):
         sys.executable,
         _SCRIPT,
         "--flagfiles=flags",
-        "--main_tasks=toy",
+        "--main_tasks=right",
         "--runs=runs",
         "--seeds=0",
         "--workers=1",
@@ -214,13 +213,13 @@ class CommandTest(absltest.TestCase):
     self.assertIn("2 runs: 1 waiting, 1 no flagfile", listed.stdout)
     self.assertFalse((self.folder / "runs").exists())
     running = self._start("--algorithms=lfgp,dac")
-    run = self.folder / "runs" / "lfgp_toy_0"
-    log = run.with_name("lfgp_toy_0.log")
+    run = self.folder / "runs" / "lfgp_right_0"
+    log = run.with_name("lfgp_right_0.log")
     _wait_for((run / "metrics.csv").exists)
     running.send_signal(signal.SIGINT)
     _, errors = running.communicate(timeout=60)
     self.assertEqual(running.returncode, command.INTERRUPTED, errors)
-    row = self._index()["lfgp_toy_0"]
+    row = self._index()["lfgp_right_0"]
     self.assertEqual(row["state"], "stopped")
     self.assertGreater(float(row["wall_s"]), 0)
     self.assertNotEmpty(os.listdir(run / "checkpoints"))
@@ -228,7 +227,7 @@ class CommandTest(absltest.TestCase):
     done = self._call()
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 3000", log.read_text())
-    row = self._index()["lfgp_toy_0"]
+    row = self._index()["lfgp_right_0"]
     self.assertEqual((row["state"], row["env_step"]), ("done", "3000"))
     self.assertNotEmpty(row["success"])
     again = self._call()
@@ -251,7 +250,7 @@ class CommandTest(absltest.TestCase):
       self.skipTest("the extra ray is not installed")
     done = self._call("--engine=ray", "--train=--config.env_steps=60")
     self.assertEqual(done.returncode, 0, done.stderr)
-    self.assertEqual(self._index()["lfgp_toy_0"]["state"], "done")
+    self.assertEqual(self._index()["lfgp_right_0"]["state"], "done")
 
 
 def _wait_for(condition, seconds: float = 60) -> None:
