@@ -154,7 +154,9 @@ class DacTest(absltest.TestCase):
     row = np.ones(OBS, np.float32)
     np.testing.assert_array_equal(loaded.act(row), policy.act(row))
     options["layout"] = "fully_connected"
-    with self.assertRaisesRegex(ValueError, "layout is 'fully_connected'; val"):
+    with self.assertRaisesRegex(
+      ValueError, "policy.layout is 'fully_connected'; valid"
+    ):
       Policy.from_arrays(policy.arrays(), options)
 
 

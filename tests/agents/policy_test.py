@@ -153,7 +153,9 @@ class FolderTest(absltest.TestCase):
   def test_wrong_options_are_listed(self):
     policy = _policy()
     options = policy.options() | {"action_size": "3", "tasks": []}
-    with self.assertRaisesRegex(ValueError, "action_size is '3'.*tasks is"):
+    with self.assertRaisesRegex(
+      ValueError, r"policy.tasks is \[\].*policy.action_size is '3'"
+    ):
       Policy.from_arrays(policy.arrays(), options)
 
 
