@@ -28,7 +28,7 @@ def make_intentions(
   """Draws K intentions.
 
   Args:
-    layout: a name in `LAYOUTS`.
+    layout: shared_trunk or separate.
     standardiser: raw observation -> input.
     tasks: K.
     hidden: H.

@@ -4,7 +4,6 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
@@ -64,19 +63,6 @@ class SeparateNetworksTest(parameterized.TestCase):
     first = _shapes(networks.discriminator)["first.weight"]
     self.assertEqual(first, (256, 63))
 
-  def test_critics_equal_plain_networks(self):
-    heads = _agent().learner.networks.critics.heads
-    inputs, action = torch.randn(5, OBS), torch.randn(5, A)
-    for twin in range(2):
-      weight = torch.cat(
-        [heads.feature_weight[twin], heads.action_weight[twin]]
-      )
-      hidden = torch.cat([inputs, action], -1) @ weight + heads.bias[twin]
-      hidden = torch.relu(hidden) @ heads.second.weight[twin]
-      hidden = torch.relu(hidden + heads.second.bias[twin])
-      q = hidden @ heads.output.weight[twin] + heads.output.bias[twin]
-      torch.testing.assert_close(heads(inputs, action)[twin, 0], q[:, 0])
-
   @parameterized.parameters("shared", "own")
   def test_each_loss_trains_its_own_network_alone(self, actor_trunk):
     agent = _agent(
@@ -103,29 +89,8 @@ class SeparateNetworksTest(parameterized.TestCase):
       norms = layer.weight.grad.flatten(1).norm(dim=1)
       self.assertEqual((norms > 0).tolist(), [False, True, False])
 
-  def test_one_head_equals_all(self):
-    heads = _heads()
-    inputs = torch.randn(4, OBS)
-    torch.testing.assert_close(heads.one(inputs, 2)[0], heads(inputs)[0][2])
-
 
 class DacTest(absltest.TestCase):
-  def test_discriminator_learns_and_critics_follow(self):
-    torch.set_num_threads(1)
-    agent = _agent(**{"reward.learning_rate": 3e-3})
-    agent.update()
-    early = agent.metrics()
-    for _ in range(150):
-      agent.update()
-    agent.metrics()
-    for _ in range(20):
-      agent.update()
-    late = agent.metrics()
-    self.assertGreater(late[f"accuracy_expert/{TASK}"], 0.95)
-    self.assertGreater(late[f"accuracy_policy/{TASK}"], 0.95)
-    self.assertLess(late["loss/discriminator"], early["loss/discriminator"])
-    self.assertTrue(np.isfinite(late["loss/critic"]))
-
   def test_acts_by_its_one_intention_and_resumes(self):
     agent, other = _agent(), _agent()
     agent.begin_episode()
@@ -136,15 +101,6 @@ class DacTest(absltest.TestCase):
     agent.update()
     other.update()
     fixtures.assert_same_policy(agent, other)
-
-  def test_policy_folder_acts_the_same(self):
-    policy = _agent().policy
-    folder = self.create_tempdir().full_path
-    policy.save(folder)
-    loaded = Policy.load(folder)
-    self.assertEqual(loaded.options()["layout"], "separate")
-    rows = synthetic.transitions(3, OBS, A).observation
-    np.testing.assert_array_equal(loaded.act(rows), policy.act(rows))
 
   def test_policies_stored_without_a_layout_share_a_trunk(self):
     policy = _agent(**{"networks.layout": "shared_trunk"}).policy

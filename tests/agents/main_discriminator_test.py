@@ -67,19 +67,6 @@ class MainDiscriminatorTest(absltest.TestCase):
     metrics = agent.learner.update(draw)
     self.assertEqual(metrics["accuracy_policy"].shape, (3,))
 
-  def test_a_checkpoint_brings_both_back(self):
-    agent, other = _agent(), _agent()
-    for _ in range(3):
-      agent.update()
-    other.load_state_dict(agent.state_dict())
-    for _ in range(2):
-      agent.update()
-      other.update()
-    rows = torch.ones(2, OBS), torch.ones(2, A)
-    np.testing.assert_array_equal(
-      agent.learner.reward.rewards(*rows), other.learner.reward.rewards(*rows)
-    )
-
   def test_transfer_carries_the_other_tasks_over(self):
     for fields in ({}, {"reward.main_masked": ""}):
       source = _agent(("old", "reach", "open_gripper"), **fields)

@@ -57,7 +57,7 @@ class InitialBoundsTest(absltest.TestCase):
       torch.testing.assert_close(one, other, rtol=0, atol=0)
 
 
-class StackingTest(absltest.TestCase):
+class StackingTest(parameterized.TestCase):
   def test_stack_equals_separate_layers(self):
     layer = StackedLinear(K, OBS, H, _generator())
     rows = torch.randn(K, B, OBS, generator=_generator())
@@ -70,8 +70,9 @@ class StackingTest(absltest.TestCase):
     torch.testing.assert_close(layer(rows), expected)
     torch.testing.assert_close(layer.one(rows[1], 1), expected[1])
 
-  def test_one_intention_equals_its_row_of_all(self):
-    heads = IntentionHeads(K, H, H, A, _generator())
+  @parameterized.parameters(1, 2)
+  def test_one_intention_equals_its_row_of_all(self, layers):
+    heads = IntentionHeads(K, H, H, A, _generator(), layers)
     features = torch.randn(B, H, generator=_generator())
     mean, std = heads(features)
     self.assertEqual(tuple(mean.shape), (K, B, A))
@@ -96,21 +97,6 @@ class StackingTest(absltest.TestCase):
     for task in range(K):
       alone = network(inputs, action[task])
       torch.testing.assert_close(together[:, task], alone[:, task])
-
-  def test_critic_head_equals_one_layer_over_features_and_action(self):
-    heads = TwinCriticHeads(K, H, H, A, _generator())
-    features = torch.randn(B, H, generator=_generator())
-    action = torch.randn(B, A, generator=_generator())
-    q = heads(features, action)
-    group = K + 1  # the second critic of task 1
-    weight = torch.cat(
-      [heads.feature_weight[group], heads.action_weight[group]]
-    )
-    hidden = torch.cat([features, action], -1) @ weight + heads.bias[group]
-    value = (
-      hidden.relu() @ heads.output.weight[group] + heads.output.bias[group]
-    )
-    torch.testing.assert_close(q[1, 1], value[:, 0])
 
   def test_layer_norm_bounds_the_values(self):
     heads = TwinCriticHeads(K, H, H, A, _generator(), layer_norm=True)
