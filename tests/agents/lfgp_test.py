@@ -48,6 +48,7 @@ class LearningTest(parameterized.TestCase):
 
   @parameterized.parameters(
     (TASKS, {}),
+    (TASKS, {"reward.main_masked": "0:2", "reward.input": "state"}),
     (
       TASKS[:1],  # DAC
       {"networks.layout": "separate", "scheduler.kind": "main_only"},
@@ -96,11 +97,17 @@ class ContractTest(parameterized.TestCase):
     agent.begin_episode()
     agent.act(np.zeros(OBS, np.float32))
     first = agent.metrics()
-    names = ["loss/discriminator", "loss/critic", "loss/policy"]
-    names += ["loss/temperature"]
-    for name in ("accuracy_expert", "accuracy_policy", "reward", "q"):
-      names += [f"{name}/{task}" for task in TASKS]
-    for name in ("temperature", "entropy", "scheduler"):
+    names = ["discriminator", "critic", "policy", "temperature"]
+    names = [f"loss/{name}" for name in names]
+    for name in [
+      "accuracy_expert",
+      "accuracy_policy",
+      "reward",
+      "q",
+      "temperature",
+      "entropy",
+      "scheduler",
+    ]:
       names += [f"{name}/{task}" for task in TASKS]
     self.assertContainsSubset(names, first)
     self.assertTrue(math.isnan(first["loss/critic"]))
