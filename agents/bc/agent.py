@@ -13,14 +13,10 @@ from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.bc.config import BcConfig
 from lfgp_dmc.agents.bc.pairs import SplitPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
-from lfgp_dmc.agents.demonstration_pool import (
-  check_sizes,
-  pooled_observations,
-)
+from lfgp_dmc.agents.demonstration_pool import make_standardiser
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
-from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
@@ -201,13 +197,9 @@ def build(
   """
   del replay, unused
   device = torch.device(device)
-  observation = pooled_observations(demonstrations, tasks)
-  check_sizes(demonstrations, tasks, observation_size, action_size)
-  standardiser = Standardiser(
-    observation_size, config.inputs.tanh_feature_scale
-  )
-  if config.inputs.standardise:
-    standardiser.fit(observation)
+  standardiser = make_standardiser(
+    config.inputs, demonstrations, tasks, observation_size, action_size
+  ).to(device)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   network = layouts.make_intentions(
     config.networks.layout,
