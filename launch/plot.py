@@ -1,15 +1,13 @@
-"""Draws figures from the CSV files of runs, and the table of datasets.
+"""Draws figures from the CSV files of runs.
 
   python launch/plot.py --runs=runs/stack_1,runs/stack_2 --output=results
   python launch/plot.py --figure=main --runs=runs/paper --output=results
-  python launch/plot.py --figure=datasets --datasets='data/*' --output=results
 
 --figure=runs draws every task of each algorithm and main task; its other
 values are the paper's: main (success of all methods), multitask (every task of
-the multitask methods), transfer, play, the same with return_ before them, and
-datasets (the table of shared demonstrations, as CSV and Markdown). Seeds are
-one line: --estimate=mean draws mean and standard deviation as in the paper,
-iqm the interquartile mean and its stratified bootstrap interval, both both.
+the multitask methods), transfer and play, or the same with return_ before them.
+Seeds are one line: --estimate=mean draws mean and standard deviation as in the
+paper, iqm the interquartile mean and its stratified bootstrap interval.
 The numbers of each figure are in the CSV file beside it.
 """
 
@@ -20,14 +18,12 @@ from collections.abc import Sequence
 
 from absl import flags
 
-from lfgp_dmc import dataset_table
-from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import aggregates, figures, learning_curve, run_results
 
-_EACH, _DATASETS, _BOTH = "runs", "datasets", "both"
+_EACH, _BOTH = "runs", "both"
 
 _RUNS = flags.DEFINE_list(
   "runs",
@@ -38,7 +34,7 @@ _OUTPUT = flags.DEFINE_string("output", "results", "Folder for the figures.")
 _FIGURE = flags.DEFINE_enum(
   "figure",
   _EACH,
-  [_EACH, *figures.PLANS, _DATASETS],
+  [_EACH, *figures.PLANS],
   "Which figure; see above.",
 )
 _QUANTITY = flags.DEFINE_enum(
@@ -53,17 +49,11 @@ _ESTIMATE = flags.DEFINE_enum(
 _FORMAT = flags.DEFINE_enum(
   "format", "png", ["png", "pdf", "svg"], "Of the figures."
 )
-_DATASET_FOLDERS = flags.DEFINE_list(
-  "datasets", [], "Folders, or patterns, of --figure=datasets."
-)
 
 
 def main() -> None:
   """Draws, and says which runs a figure lacks."""
   output = pathlib.Path(_OUTPUT.value)
-  if _FIGURE.value == _DATASETS:
-    _write_dataset_table(output)
-    return
   folders = _matching(_RUNS.value, "runs", "the folders of one or more runs")
   if _FIGURE.value == _EACH:
     _draw_each(folders, output)
@@ -108,18 +98,6 @@ def _draw_study(folders: Sequence[str], output: pathlib.Path) -> None:
     print(path)
   for note in dict.fromkeys(notes):
     print(f"note: {note}")
-
-
-def _write_dataset_table(output: pathlib.Path) -> None:
-  folders = _matching(_DATASET_FOLDERS.value, "datasets", "dataset folders")
-  with command.checked_input():
-    rows = dataset_table.rows([dataset_table.read(path) for path in folders])
-  text = dataset_table.markdown(rows)
-  output.mkdir(parents=True, exist_ok=True)
-  csv_files.write(output / "datasets.csv", dataset_table.COLUMNS, rows)
-  with files.replacing(output / "datasets.md") as aside:
-    aside.write_text(text, encoding="utf-8")
-  print(f"{text}\n{output / 'datasets.csv'}\n{output / 'datasets.md'}")
 
 
 def _matching(patterns: Sequence[str], flag: str, wanted: str) -> list[str]:

@@ -8,10 +8,8 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc.launch.command import UserError
@@ -56,20 +54,6 @@ def stored_policy(folder: str) -> Actor:
 
   torch.set_num_threads(1)  # one row at a time: threads only get in the way
   return Policy.load(folder)
-
-
-def sampling_policy(
-  options: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
-) -> Actor:
-  """The policy of a learner's arrays, that samples its actions."""
-  import torch
-
-  from lfgp_dmc.agents.policy import Policy
-
-  torch.set_num_threads(1)
-  policy = Policy.from_arrays(arrays, options)
-  policy.deterministic = False
-  return policy
 
 
 def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:

@@ -24,7 +24,6 @@ from lfgp_dmc.launch import (
 )
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig, from_dict
-from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.runs import loop, resuming, run_folder, supervised
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.run_folder import RunFolder
@@ -204,7 +203,6 @@ class _Run:
     self._progress_bar = progress_bar
     self._save_policy(self._progress.env_step)
     schedule = _schedule(self._config, progress_bar)
-    remote = None
     try:
       if self._replay is None:
         return supervised.train(
@@ -215,8 +213,6 @@ class _Run:
           self._checkpoint,
           progress=self._progress,
         )
-      if self._config.actor_process:
-        remote = self._make_remote_actor(self._replay.reward_tasks)
       return loop.train(
         self._environment,
         self._agent,
@@ -227,21 +223,10 @@ class _Run:
         self._checkpoint,
         seed=seeding.derive(self._config.seed, "environment"),
         progress=self._progress,
-        remote=remote,
       )
     finally:
-      if remote is not None:
-        remote.close()
       self._log.close()
       self._environment.close()
-
-  def _make_remote_actor(self, reward_tasks: tuple[str, ...]) -> RemoteActor:
-    config = self._config
-    return RemoteActor(
-      config.world.factory(config.keeps_rewards),
-      functools.partial(policies.sampling_policy, self._agent.policy_options()),
-      reward_tasks,
-    )
 
   def _evaluate(self, env_step: int) -> dict[str, float]:
     self._save_policy(env_step)

@@ -89,11 +89,10 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   """Lays the named observables out in the order of the released code.
 
   Args:
-    observation: a timestep's observation with all eleven components; those of
-      a vector environment have W in front.
+    observation: a timestep's observation with all eleven components.
 
   Returns:
-    float32 [59], or [W, 59].
+    float32 [59].
 
   Raises:
     KeyError: a component is missing (vision leaves the privileged ones out).
@@ -105,7 +104,7 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
       f"observation lacks {error}; the 59 floats need "
       f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
     ) from None
-  return np.concatenate(parts, axis=-1, dtype=np.float32)[..., _FLAT]
+  return np.concatenate(parts, dtype=np.float32)[_FLAT]
 
 
 def successes(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:

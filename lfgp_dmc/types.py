@@ -4,19 +4,17 @@ Shapes are written `[B, K, A]`:
   B: batch rows.                 K: tasks, in the order of `task_set`.
   A: action dimensions (4).      O: observation dimensions (59).
   N: stored pairs or rows.       H: hidden units.
-  T: control steps.              W: environments side by side.
+  T: control steps.
 
 Units are SI (m, m/s, rad/s, N, N m); quaternions are w x y z.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-import dm_env
 import numpy as np
 
 Metrics = dict[str, float]
-EnvironmentFactory = Callable[[], dm_env.Environment]
 
 
 class Transition(NamedTuple):
@@ -34,14 +32,6 @@ class Step(NamedTuple):
   rewards: np.ndarray | None  # float32 [R] if the replay keeps them
   is_last: bool
   is_physics_failure: bool
-
-
-class Period(NamedTuple):
-  """What a scheduler chose: some steps of one intention."""
-
-  task: str
-  steps: int
-  random_steps: int  # the first so many take actions from U[-1, 1]
 
 
 class Actor(Protocol):
@@ -67,13 +57,6 @@ class Agent(Protocol):
 
   def act(self, observation: np.ndarray) -> np.ndarray:
     """Chooses the exploring action, float32 [A]; steps the scheduler."""
-
-  def next_period(self, env_step: int) -> Period:
-    """Steps the scheduler for an actor elsewhere; in place of `act`.
-
-    Args:
-      env_step: steps of the run before the period.
-    """
 
   def end_episode(self, episode: "Episode") -> None:
     """Called once the episode is complete (the scheduler learns here)."""

@@ -49,7 +49,6 @@ class RunConfig:
   replay_capacity: int = 4_000_000  # transitions
   device: str = "auto"  # cpu, cuda, ...; auto: cuda where there is one
   threads: int = 1  # of torch; 0: one a core that this process may use
-  actor_process: bool = False  # act in another process, while this one learns
   deterministic: bool = False  # the same numbers again, after a resume too
 
   agent: Any = None  # the dataclass of the algorithm's own settings

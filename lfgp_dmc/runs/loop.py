@@ -18,7 +18,6 @@ from absl import logging
 from lfgp_dmc import seeding
 from lfgp_dmc.acting import environments
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.signals import StopRequest, stop_request
 from lfgp_dmc.types import Agent, Episode, Step, Transition
@@ -78,7 +77,6 @@ def train(
   *,
   seed: int = 0,
   progress: Progress | None = None,
-  remote: RemoteActor | None = None,
 ) -> Progress:
   """Trains until `schedule.env_steps`, or until SIGINT or SIGTERM.
 
@@ -97,15 +95,11 @@ def train(
     checkpoint_fn: stores agent, replay and the progress it is given.
     seed: of the episodes' starts and the random actions.
     progress: of the checkpoint that is being resumed.
-    remote: plays the episodes while this process learns; it has a world of its
-      own. None: they are played here, in turns with the updates.
 
   Returns:
     The progress; `is_complete` tells whether it was stopped.
   """
-  loop = _Loop(
-    environment, agent, replay, schedule, log, seed, progress, remote
-  )
+  loop = _Loop(environment, agent, replay, schedule, log, seed, progress)
   with stop_request() as stop:
     loop.run(stop, evaluate_fn, checkpoint_fn)
   return loop.progress
@@ -114,11 +108,8 @@ def train(
 class _Loop:
   """The state of one call of `train`."""
 
-  def __init__(
-    self, environment, agent, replay, schedule, log, seed, progress, remote
-  ):
+  def __init__(self, environment, agent, replay, schedule, log, seed, progress):
     self.progress: Progress = progress or Progress()
-    self._remote: RemoteActor | None = remote
     self._environment: dm_env.Environment = environment
     self._agent: Agent = agent
     self._replay: Replay = replay
@@ -173,16 +164,8 @@ class _Loop:
     """Plays to the episode's end, or to the last step of the run."""
     progress, schedule = self.progress, self._schedule
     number = progress.episodes + progress.physics_failures
-    steps = self._here(number)
-    if self._remote is not None:
-      steps = self._remote.episode(
-        self._agent,
-        seeding.derive(self._seed, "training episode", number),
-        progress.env_step,
-        schedule.env_steps - progress.env_step,
-      )
     rows: list[Step] = []
-    for step in steps:
+    for step in self._here(number):
       progress.env_step += 1
       if step.is_physics_failure:
         self._drop_episode(len(rows))

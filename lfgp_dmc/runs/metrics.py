@@ -31,11 +31,6 @@ class MetricsLog:
       str(self._path.parent / _EVENTS_FOLDER)
     )
 
-  @property
-  def columns(self) -> tuple[str, ...]:
-    """The columns, in order; empty before the first row."""
-    return tuple(self._columns)
-
   def write(self, row: Mapping[str, float]) -> None:
     """Appends one row and flushes it.
 

@@ -42,11 +42,6 @@ class RunFolder:
     return self.path / "evaluation.csv"
 
   @property
-  def metrics(self) -> pathlib.Path:
-    """A row a log interval, CSV."""
-    return self.path / "metrics.csv"
-
-  @property
   def checkpoints(self) -> pathlib.Path:
     """The folder of checkpoints."""
     return self.path / "checkpoints"

@@ -221,7 +221,6 @@ class BlockRunTest(absltest.TestCase):
         "mj_step_per_s",
         "mj_step_fraction",
         "reset_ms",
-        *(f"vector_steps_per_s_{count}" for count in (1, 2, 4)),
       ],
     )
     self.assertContainsSubset(

@@ -49,9 +49,8 @@ class TrainingTest(parameterized.TestCase):
     stored = run_folder.read_config(self.run)
     self.assertEqual(stored["policy"]["env_step"], 200)
 
-  @parameterized.parameters(False, True)
-  def test_resumes_to_the_numbers_of_a_run_never_stopped(self, actor_process):
-    config = self._config(actor_process=actor_process)
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
+    config = self._config()
     self._train(config)
     other = self.folder / "runs" / "b"
     real, calls = training._Run._checkpoint, []

@@ -8,7 +8,7 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc import seeding
+from lfgp_dmc import seeding, tasks
 
 
 class _Policy:
@@ -34,11 +34,10 @@ class FacadeTest(parameterized.TestCase):
       self.assertTrue(hasattr(lfgp_dmc, name), name)
 
   def test_load_passes_everything_on(self):
-    tasks = types.SimpleNamespace(load=mock.Mock(return_value="environment"))
-    with mock.patch.dict(sys.modules, {"lfgp_dmc.tasks": tasks}):
+    with mock.patch.object(tasks, "load") as load:
       made = lfgp_dmc.load("stack", seed=3, reward="dense")
-    self.assertEqual(made, "environment")
-    tasks.load.assert_called_once_with("stack", seed=3, reward="dense")
+    self.assertEqual(made, load.return_value)
+    load.assert_called_once_with("stack", seed=3, reward="dense")
 
   def test_load_policy_acts_for_the_named_task(self):
     agents = types.SimpleNamespace(Policy=_Policy)

@@ -71,6 +71,25 @@ class GymnasiumTest(parameterized.TestCase):
     np.testing.assert_array_equal(*first)
     env.close()
 
+  def test_steps_environments_side_by_side(self):
+    env = gymnasium.make_vec(
+      _IDS["stack"],
+      num_envs=2,
+      vectorization_mode="async",
+      vector_kwargs={"context": "spawn"},
+    )
+    singles = [lfgp_dmc.load("stack", seed) for seed in (5, 6)]
+    together, _ = env.reset(seed=[5, 6])
+    apart = [one.reset() for one in singles]
+    random = np.random.default_rng(0)
+    for _ in range(5):
+      for row, alone in zip(together, apart, strict=True):
+        np.testing.assert_array_equal(row, lfgp_dmc.flatten(alone.observation))
+      actions = random.uniform(-1, 1, (2, 4)).astype(np.float32)
+      together, *_ = env.step(actions)
+      apart = [s.step(a) for s, a in zip(singles, actions, strict=True)]
+    env.close()
+
   def test_success_is_told_and_does_not_end_the_episode(self):
     env = gymnasium.make(_IDS["reach"])
     blue = np.array([0.0, 0.5, 0.145, 1, 0, 0, 0])
