@@ -23,7 +23,8 @@ from absl import flags
 
 from lfgp_dmc import graphics, seeding, task_names
 from lfgp_dmc.acting import evaluation
-from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.launch.environment_spec import World
@@ -62,7 +63,7 @@ def main() -> int:
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
-  rows = evaluation.read_csv(path / "evaluation.csv")
+  rows = evaluation_csv.read_csv(path / "evaluation.csv")
   trained = [row for row in rows if row.env_step == progress.env_step]
   columns = {
     "untrained": _evaluate_untrained(config),
@@ -94,7 +95,8 @@ def table(
 ) -> str:
   """Success by task, the columns side by side."""
   rates = {
-    name: evaluation.success_rates(list(rows)) for name, rows in columns.items()
+    name: evaluation_csv.success_rates(list(rows))
+    for name, rows in columns.items()
   }
   lines = [
     f"success on the same {config.evaluation_episodes} resets of "

@@ -14,6 +14,7 @@ from absl import flags
 
 import lfgp_dmc
 from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.task_names import CONTROL_RATES
@@ -53,7 +54,7 @@ def main() -> None:
   command.check_least("workers", _WORKERS.value, 0)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
-  rows: list[evaluation.EvaluationRow] = []
+  rows: list[evaluation_csv.EvaluationRow] = []
   for cast, tasks in _plan():
     rows += evaluation.evaluate(
       cast.world.factory(show_rewards=True),
@@ -64,7 +65,7 @@ def main() -> None:
       _WORKERS.value or command.cores(),
       env_step=cast.env_step,
     )
-  print(evaluation.success_table(rows))
+  print(evaluation_csv.success_table(rows))
   if output is not None:
     add_rows(output, rows)
     print(f"\n{output}")
@@ -127,7 +128,7 @@ def _output() -> pathlib.Path | None:
 
 
 def add_rows(
-  path: pathlib.Path, rows: Sequence[evaluation.EvaluationRow]
+  path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
 ) -> None:
   """Appends the rows that the file does not have; makes it if missing.
 
@@ -136,9 +137,9 @@ def add_rows(
   """
   path.parent.mkdir(parents=True, exist_ok=True)
   with command.checked_input():
-    known = evaluation.read_csv(path) if path.exists() else []
+    known = evaluation_csv.read_csv(path) if path.exists() else []
   keys = {row[:4] for row in known}  # env_step, task, episode, seed
-  evaluation.append_csv(path, [row for row in rows if row[:4] not in keys])
+  evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import torch
 
 from lfgp_dmc import seeding, task_names
 from lfgp_dmc.acting import environments, evaluation
-from lfgp_dmc.data import files
+from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import (
@@ -27,6 +27,7 @@ from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig, from_dict
 from lfgp_dmc.runs import loop, resuming, run_folder, supervised
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.run_folder import RunFolder
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 _ARRAYS = "policy.safetensors"
 _DETERMINISTIC_CUBLAS = ":4096:8"
@@ -37,7 +38,7 @@ def train(
   path: pathlib.Path,
   resume: bool = False,
   progress_bar: bool = True,
-) -> loop.Progress:
+) -> Progress:
   """Trains, or goes on training, in a run's folder.
 
   Args:
@@ -124,7 +125,7 @@ def evaluate_policy(
   tasks: tuple[str, ...],
   env_step: int,
   progress_bar: bool,
-) -> list[evaluation.EvaluationRow]:
+) -> list[evaluation_csv.EvaluationRow]:
   """Plays the stored policy: every task, the config's episodes and seed."""
   return evaluation.evaluate(
     config.world.factory(show_rewards=True),
@@ -184,7 +185,7 @@ class _Run:
       config, tasks, shown, self._replay, device, widths
     )
     self._log = MetricsLog(run.path)
-    self._progress = loop.Progress()
+    self._progress = Progress()
 
   def start(self) -> None:
     """Takes over what the config says from other runs and policies."""
@@ -198,7 +199,7 @@ class _Run:
     if not self._progress.env_step:
       self.start()
 
-  def train(self, progress_bar: bool) -> loop.Progress:
+  def train(self, progress_bar: bool) -> Progress:
     """Runs the loop to its end or to a signal."""
     self._progress_bar = progress_bar
     self._save_policy(self._progress.env_step)
@@ -233,10 +234,10 @@ class _Run:
     rows = evaluate_policy(
       self._config, self._run.path, self._tasks, env_step, self._progress_bar
     )
-    evaluation.append_csv(self._run.evaluation, rows)
-    return evaluation.success_rates(rows)
+    evaluation_csv.append_csv(self._run.evaluation, rows)
+    return evaluation_csv.success_rates(rows)
 
-  def _checkpoint(self, progress: loop.Progress) -> None:
+  def _checkpoint(self, progress: Progress) -> None:
     self._save_policy(progress.env_step)
     resuming.save(
       self._run, self._agent, self._replay, progress, self._config.env_steps
@@ -301,14 +302,14 @@ def _write_policy(
   )
 
 
-def _schedule(config: RunConfig, progress_bar: bool) -> loop.TrainSchedule:
+def _schedule(config: RunConfig, progress_bar: bool) -> TrainSchedule:
   pace = {}
   if not ALGORITHMS[config.algorithm].is_supervised:
     pace["warmup_steps"] = config.agent.warm_up
     if config.transfer_from:  # there is a replay from the start
       pace["warmup_steps"] = min(config.agent.warm_up, config.agent.batch_size)
     pace["updates_per_step"] = config.agent.updates_per_step
-  return loop.TrainSchedule(
+  return TrainSchedule(
     env_steps=config.env_steps,
     log_every=config.log_every,
     evaluate_every=config.evaluate_every,

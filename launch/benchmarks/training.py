@@ -14,6 +14,7 @@ from lfgp_dmc.launch.benchmarks import learner
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.runs import loop
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 _ACTION_SIZE = 4
 _EPISODE = 360
@@ -65,10 +66,8 @@ def measure(
   environment.close()
 
 
-def _train(
-  config, environment, agent, replay, env_steps, progress
-) -> loop.Progress:
-  schedule = loop.TrainSchedule(
+def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
+  schedule = TrainSchedule(
     env_steps=env_steps,
     log_every=config.log_every,
     warmup_steps=_EPISODE + 1,

@@ -1,5 +1,6 @@
 """Attempts: what an expert does from one start to success or to a limit."""
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,9 +10,9 @@ import dm_env
 import numpy as np
 
 from lfgp_dmc import seeding
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import rollout
 from lfgp_dmc.acting.environments import has_succeeded, is_physics_failure
-from lfgp_dmc.types import Actor
+from lfgp_dmc.types import Actor, Transition
 
 LIMIT = 90  # steps of an attempt at 20 Hz (the released code's)
 # Unstack-Stack's is the authors' later setting. Ours: Bring's expert may first
@@ -72,19 +73,11 @@ class Plan:
     return self.steps(at_20_hz if self.control_hz >= 20 else 2 * at_20_hz)
 
 
-class Rows(NamedTuple):
-  """The T steps of a successful attempt."""
-
-  observation: np.ndarray  # float32 [T, O]
-  action: np.ndarray  # float32 [T, A]
-  next_observation: np.ndarray  # float32 [T, O]
-
-
 class Attempt(NamedTuple):
-  """A finished attempt; `rows` is None unless it succeeded."""
+  """A finished attempt."""
 
   task: str
-  rows: Rows | None
+  rows: Transition | None  # arrays [T, ...]; None unless it succeeded
 
 
 class Collector:
@@ -122,7 +115,7 @@ class Collector:
     self._load(plan.main_task if lead == plan.main_task else task)
     self._environment.reseed(seed)
     timestep = self._environment.reset()
-    before = _Steps()
+    before: list[Transition] = []
     if lead is not None:
       steps = plan.steps(OPEN_LEAD if task == OPEN else CLOSE_LEAD)
       self._actor.begin(lead, seeding.derive(seed, "lead actor"))
@@ -130,10 +123,10 @@ class Collector:
       if timestep.last():
         return Attempt(task, None)
       self._environment.clear_success()
-    stored = before if task == CLOSE else _Steps()
+    stored = before if task == CLOSE else []
     self._actor.begin(task, seeding.derive(seed, "actor"))
     timestep, success = self._run(timestep, task, plan.limit(task), stored)
-    return Attempt(task, stored.rows() if success else None)
+    return Attempt(task, _stacked(stored) if success else None)
 
   def _lead(self, task: str, random: np.random.Generator) -> str | None:
     """Which task comes first; None: no other is there to come first."""
@@ -169,34 +162,38 @@ class Collector:
       task = str(random.choice(plan.tasks))
       self._environment.clear_success()
       self._actor.begin(task, seeding.derive(seed, "actor", len(attempts)))
-      steps = _Steps()
+      steps: list[Transition] = []
       limit = plan.limit(task)
       timestep, success = self._run(timestep, task, min(limit, left), steps)
       left -= len(steps)
       if success:
-        attempts.append(Attempt(task, steps.rows()))
+        attempts.append(Attempt(task, _stacked(steps)))
       elif len(steps) == limit:
         attempts.append(Attempt(task, None))
     return attempts
 
-  def _run(self, timestep, task: str, limit: int, steps: "_Steps", stop=True):
+  def _run(
+    self,
+    timestep: dm_env.TimeStep,
+    task: str,
+    limit: int,
+    stored: list[Transition],
+    stop: bool = True,
+  ) -> tuple[dm_env.TimeStep, bool]:
     """Steps until success (if `stop`), the limit or the episode's end.
 
     Returns:
       The last timestep, and whether the task has succeeded.
     """
-    observation = self._flatten(timestep.observation)
     success = False
-    for _ in range(limit):
-      action = np.asarray(self._actor.act(observation), np.float32)
-      timestep = self._environment.step(action)
+    played = rollout.steps(self._environment, timestep, self._actor.act)
+    for step in itertools.islice(played, limit):
+      timestep = step.timestep
       if is_physics_failure(timestep):
         return timestep, False
-      following = self._flatten(timestep.observation)
-      steps.add(observation, action, following)
-      observation = following
+      stored.append(step.transition)
       success = stop and bool(has_succeeded(timestep, task))
-      if success or timestep.last():
+      if success:
         break
     return timestep, success
 
@@ -208,27 +205,7 @@ class Collector:
           self._environments.pop(other).close()
       self._environments[task] = self._plan.make_environment(task)
     self._environment = self._environments[task]
-    self._flatten = environments.flattener(self._environment)
 
 
-class _Steps:
-  """Collects steps; `rows` stacks them."""
-
-  def __init__(self):
-    self._steps: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
-
-  def __len__(self) -> int:
-    return len(self._steps)
-
-  def add(
-    self,
-    observation: np.ndarray,
-    action: np.ndarray,
-    next_observation: np.ndarray,
-  ) -> None:
-    """Adds a step."""
-    self._steps.append((observation, action, next_observation))
-
-  def rows(self) -> Rows:
-    """All steps, stacked."""
-    return Rows(*(np.stack(part) for part in zip(*self._steps, strict=True)))
+def _stacked(steps: Sequence[Transition]) -> Transition:
+  return Transition(*(np.stack(part) for part in zip(*steps, strict=True)))

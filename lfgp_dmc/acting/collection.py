@@ -16,8 +16,9 @@ import numpy as np
 import tqdm
 
 from lfgp_dmc.acting import workers as work
-from lfgp_dmc.acting.attempts import Attempt, Collector, Job, Plan, Rows
+from lfgp_dmc.acting.attempts import Attempt, Collector, Job, Plan
 from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.types import Transition
 
 COLLECTIONS = ("reset", "play")
 
@@ -140,7 +141,7 @@ class _Pile:
 
   def __init__(self, task: str, pairs: int, finals: int):
     self._task, self._pairs, self._wanted = task, pairs, pairs + finals
-    self._rows: list[Rows] = []
+    self._rows: list[Transition] = []
     self._stored = self._attempts = self._failures = 0
 
   @property
@@ -171,7 +172,7 @@ class _Pile:
       self._rows.append(attempt.rows)
       self._stored = min(before + len(attempt.rows.action), self._pairs)
     else:
-      self._rows.append(Rows(*(part[-1:] for part in attempt.rows)))
+      self._rows.append(Transition(*(part[-1:] for part in attempt.rows)))
       self._stored += 1
     return self._stored - before
 

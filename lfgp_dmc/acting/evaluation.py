@@ -15,29 +15,10 @@ import tqdm
 from absl import logging
 
 from lfgp_dmc import seeding
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.acting import workers as work
-from lfgp_dmc.data.evaluation_csv import (
-  EvaluationRow,
-  append_csv,
-  mean_returns,
-  read_csv,
-  success_rates,
-  success_table,
-  write_csv,
-)
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.types import Actor
-
-__all__ = [
-  "EvaluationRow",
-  "append_csv",
-  "evaluate",
-  "mean_returns",
-  "read_csv",
-  "success_rates",
-  "success_table",
-  "write_csv",
-]
 
 
 def evaluate(
@@ -94,7 +75,6 @@ class _Player:
     self._seed = seed
     self._env_step = env_step
     self._environment = make_environment()
-    self._flatten = environments.flattener(self._environment)
     self._actor: Actor = make_actor()
 
   def __call__(self, job: tuple[str, int]) -> EvaluationRow:
@@ -104,9 +84,8 @@ class _Player:
     self._actor.begin(task, seeding.derive(self._seed, "actor", task, episode))
     timestep = self._environment.reset()
     steps, total, first = 0, 0.0, None
-    while not timestep.last():
-      action = self._actor.act(self._flatten(timestep.observation))
-      timestep = self._environment.step(action)
+    for step in rollout.steps(self._environment, timestep, self._actor.act):
+      timestep = step.timestep
       steps += 1
       total += float(environments.task_rewards(timestep, (task,))[0])
       if first is None and environments.has_succeeded(timestep, task):

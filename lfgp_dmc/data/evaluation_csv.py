@@ -1,7 +1,4 @@
-"""`evaluation.csv`, its rows, and the table of success that people read.
-
-Users reach all of it through `evaluation.py`.
-"""
+"""`evaluation.csv`, its rows, and the table of success."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -31,11 +28,6 @@ class EvaluationRow(NamedTuple):
   success: int | None  # 0 or 1; None: the environment cannot tell
   steps_to_success: int | None  # control steps until the first success
   episode_return: float  # column `return`: undiscounted reward of that task
-
-
-def write_csv(path: files.Path, rows: Iterable[EvaluationRow]) -> None:
-  """Writes a whole file, replacing what was there."""
-  csv_files.write(path, COLUMNS, [_as_text(row) for row in rows])
 
 
 def append_csv(path: files.Path, rows: Iterable[EvaluationRow]) -> None:

@@ -5,32 +5,21 @@ kill between the two leaves a replay that is ahead, and it is rewound.
 """
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, Protocol
 
 from absl import logging
 
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import checkpoints
-from lfgp_dmc.runs.loop import Progress
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.run_folder import RunFolder
-
-
-class Resumable(Protocol):
-  """What a checkpoint needs of an agent."""
-
-  def state_dict(self) -> dict[str, Any]:
-    """Arrays and JSON-able values: everything but the replay."""
-
-  def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned."""
+from lfgp_dmc.runs.schedule import Progress
+from lfgp_dmc.types import Agent
 
 
 def save(
   run: RunFolder,
-  agent: Resumable,
+  agent: Agent,
   replay: Replay | None,
   progress: Progress,
   run_steps: int | None = None,
@@ -58,7 +47,7 @@ def save(
 
 
 def restore(
-  run: RunFolder, agent: Resumable, replay: Replay | None, log: MetricsLog
+  run: RunFolder, agent: Agent, replay: Replay | None, log: MetricsLog
 ) -> Progress:
   """Goes back to the newest good checkpoint, or to the start without one.
 

@@ -8,9 +8,8 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents.bc import BcAgent
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.launch import configs, training
 from lfgp_dmc.runs import run_folder
 from tests.launch import fixtures
@@ -67,7 +66,7 @@ class CloningTest(parameterized.TestCase):
     best = min(float(row["loss/validation"]) for row in rows)
     self.assertLessEqual(float(last["loss/best_validation"]), best)
     tasks = ("right", "left") if algorithm == "multitask_bc" else ("right",)
-    evaluated = evaluation.read_csv(run / "evaluation.csv")
+    evaluated = evaluation_csv.read_csv(run / "evaluation.csv")
     self.assertEqual({row.task for row in evaluated}, set(tasks))
     self.assertEqual(evaluated[-1].env_step, progress.update)
     self.assertFalse((run / "replay").exists())
@@ -145,7 +144,7 @@ class OtherWorldsTest(absltest.TestCase):
       env_steps=100,
     )
     training.train(config, folder / "run", progress_bar=False)
-    (row,) = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    (row,) = evaluation_csv.read_csv(folder / "run" / "evaluation.csv")
     self.assertEqual((row.task, row.success), ("swingup", None))
     act = lfgp_dmc.load_policy(folder / "run")
     self.assertEqual(act(np.zeros(5, np.float32)).shape, (1,))
@@ -174,7 +173,7 @@ class DacRunTest(absltest.TestCase):
       },
     )
     training.train(config, folder / "run", progress_bar=False)
-    rows = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    rows = evaluation_csv.read_csv(folder / "run" / "evaluation.csv")
     self.assertEqual({row.task for row in rows}, {"right"})
     act = lfgp_dmc.load_policy(folder / "run")
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))

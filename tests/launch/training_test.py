@@ -8,11 +8,11 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.launch import training
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import loop, run_folder
+from lfgp_dmc.runs.schedule import Progress
 from tests.launch import fixtures
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")
@@ -40,7 +40,7 @@ class TrainingTest(parameterized.TestCase):
     progress = self._train(self._config(evaluate_first=True))
     self.assertEqual(progress.env_step, 200)
     self.assertLen(_rows(self.run / "metrics.csv"), 10)
-    rows = evaluation.read_csv(self.run / "evaluation.csv")
+    rows = evaluation_csv.read_csv(self.run / "evaluation.csv")
     self.assertEqual({row.env_step for row in rows}, {0, 100, 200})
     self.assertEqual({row.task for row in rows}, {"right", "left"})
     self.assertTrue((self.run / "checkpoints" / "000000200").is_dir())
@@ -133,7 +133,7 @@ class TrainingTest(parameterized.TestCase):
 
   def test_uses_the_first_pairs_alone(self):
     with mock.patch.object(loop, "train") as train:
-      train.return_value = loop.Progress()
+      train.return_value = Progress()
       self._train(self._config(pairs_per_task=20))
     agent = train.call_args.args[1]
     self.assertEqual(agent._experts._sizes.tolist(), [20, 20])

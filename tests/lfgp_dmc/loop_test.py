@@ -11,8 +11,8 @@ from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop
-from lfgp_dmc.runs.loop import Progress, TrainSchedule
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 
 class _Agent:

@@ -7,8 +7,8 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.pictures import video
 from lfgp_dmc.study import learning_curve
 
@@ -80,7 +80,7 @@ class FiguresTest(absltest.TestCase):
       for task in ("stack", "reach")
       for i in range(5)
     ]
-    evaluation.write_csv(path, rows)
+    evaluation_csv.append_csv(path, rows)
     return path
 
   def test_curves_of_one_run_and_of_several(self):
@@ -94,7 +94,7 @@ class FiguresTest(absltest.TestCase):
 
   def test_nothing_to_draw_is_an_error(self):
     path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
-    evaluation.write_csv(path, [])
+    evaluation_csv.append_csv(path, [])
     with self.assertRaisesRegex(ValueError, "no evaluation rows"):
       learning_curve.learning_curve([path], path.with_suffix(".png"))
     with self.assertRaisesRegex(ValueError, "valid: success, return"):

@@ -8,11 +8,11 @@ import numpy as np
 from absl.testing import absltest
 
 from lfgp_dmc import toy
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import checkpoints, loop, resuming, run_folder
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import TrainSchedule
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")
 _CONFIG = {"seed": 3}
@@ -85,11 +85,11 @@ class ResumingTest(absltest.TestCase):
     progress = resuming.restore(run, agent, replay, log) if resume else None
 
     def evaluate(step):
-      row = evaluation.EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)
-      evaluation.append_csv(run.evaluation, [row])
+      row = evaluation_csv.EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)
+      evaluation_csv.append_csv(run.evaluation, [row])
       return {"right": 1.0}
 
-    schedule = loop.TrainSchedule(
+    schedule = TrainSchedule(
       env_steps=400,
       log_every=15,
       evaluate_every=100,

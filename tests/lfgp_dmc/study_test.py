@@ -7,9 +7,8 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.acting.evaluation import EvaluationRow
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.study import aggregates, figures, run_results
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
 
@@ -26,7 +25,7 @@ def write_run(folder, algorithm, main_task, seed, scores, **config):
     for task in task_set(main_task)
     for i in range(4)
   ]
-  evaluation.write_csv(path / "evaluation.csv", rows)
+  evaluation_csv.append_csv(path / "evaluation.csv", rows)
   return path
 
 

@@ -8,8 +8,8 @@ from absl.testing import absltest
 
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.runs import supervised
-from lfgp_dmc.runs.loop import Progress, TrainSchedule
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 
 class _Learner:
