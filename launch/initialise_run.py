@@ -5,7 +5,6 @@ from typing import Any
 
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.data.stored_replay import StoredReplay
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
@@ -51,39 +50,5 @@ def _transfer(source: RunFolder, agent: Any, replay: Replay) -> None:
   except ValueError as error:
     raise ValueError(f"config.transfer_from: {error}") from None
   agent.carry_over(networks, tasks)
-  rows = carry_replay(StoredReplay(source.replay), replay)
+  rows = replay.copy_from(Replay.stored(source.replay))
   print(f"took over {path.name} of {source.path} with {rows} transitions")
-
-
-def carry_replay(source: StoredReplay, replay: Replay) -> int:
-  """Adds another run's transitions, the newest that there is room for.
-
-  Args:
-    source: the other run's.
-    replay: where to; where it keeps rewards, they are picked by task name.
-
-  Returns:
-    How many.
-
-  Raises:
-    ValueError: widths differ, or the source keeps no rewards of some task.
-  """
-  if source.widths != replay.widths:
-    raise ValueError(
-      f"the other run's observations and actions have {source.widths} floats; "
-      f"this world has {replay.widths}"
-    )
-  kept, wanted = source.reward_tasks, replay.reward_tasks
-  missing = [task for task in wanted if task not in kept]
-  if missing:
-    raise ValueError(
-      f"the other run's replay keeps no rewards of {', '.join(missing)}; it "
-      f"keeps: {', '.join(kept) or 'none'}"
-    )
-  columns = [kept.index(task) for task in wanted]
-  for transitions, rewards in source.chunks(newest=replay.capacity):
-    picked = None
-    if rewards is not None and columns:
-      picked = rewards[:, columns]
-    replay.add_batch(transitions, picked)
-  return len(replay)

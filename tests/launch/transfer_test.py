@@ -14,7 +14,6 @@ from lfgp_dmc.acting import environments
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.data.stored_replay import StoredReplay
 from lfgp_dmc.launch import configs, datasets, training
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
@@ -73,14 +72,14 @@ class _RunTest(parameterized.TestCase):
 class SacxTest(_RunTest):
   def test_needs_no_demonstrations_and_keeps_all_rewards(self):
     path, _ = self._train(self._config("sacx"), "a")
-    stored = StoredReplay(path / "replay")
+    stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("right", "left"))
-    for transition, rewards in stored.chunks():
-      position = transition.next_observation[:, 0]
-      expected = np.stack(
-        [1 - np.abs(position - 0.8), 1 - np.abs(position + 0.8)], axis=1
-      )
-      np.testing.assert_allclose(rewards, expected, atol=1e-5)
+    rows = np.arange(len(stored))
+    position = stored.gather(rows).next_observation[:, 0]
+    expected = [1 - np.abs(position - 0.8), 1 - np.abs(position + 0.8)]
+    np.testing.assert_allclose(
+      stored.gather_rewards(rows), np.stack(expected, axis=1), atol=1e-5
+    )
     (*_, last) = _rows(path / "metrics.csv")
     self.assertEqual(last["loss/discriminator"], "nan")
     self.assertNotEqual(last["reward/left"], "nan")
@@ -101,16 +100,17 @@ class SacxTest(_RunTest):
     replay = Replay(
       60, 2, 2, path / "replay", slack=80, reward_tasks=("right", "left")
     )
-    for transition, rewards in StoredReplay(path / "replay").chunks(newest=5):
-      replay.add_batch(transition, 100 + rewards)
+    rows = np.arange(len(replay))[-5:]
+    replay.add_batch(replay.gather(rows), 100 + replay.gather_rewards(rows))
     replay.flush()
     del replay
     self._train(config, "killed", resume=True)
     self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
-    first, second = (
-      list(StoredReplay(run / "replay").chunks()) for run in (path, whole)
-    )
-    np.testing.assert_array_equal(first[0][1], second[0][1])
+    rewards = [
+      stored.gather_rewards(np.arange(len(stored)))
+      for stored in (Replay.stored(run / "replay") for run in (path, whole))
+    ]
+    np.testing.assert_array_equal(*rewards)
 
   def test_a_task_without_a_conditional_table_is_told(self):
     with self.assertRaisesRegex(UserError, "no conditional table for.*'right'"):
@@ -177,11 +177,12 @@ class TransferTest(_RunTest):
       source, "sacx", environment=fixtures.POINT, main_task="left"
     )
     path, _ = self._train(target, "new")
-    stored = StoredReplay(path / "replay")
+    stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("left", "right"))
-    (transition, rewards), *_ = stored.chunks()
+    rows = np.arange(len(stored))
+    rewards = stored.gather_rewards(rows)
     self.assertLen(rewards, 160)
-    position = transition.next_observation[:, 0]
+    position = stored.gather(rows).next_observation[:, 0]
     np.testing.assert_allclose(rewards[:, 0], 1 - abs(position + 0.8),
                                atol=1e-5)  # fmt: skip
 
