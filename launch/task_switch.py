@@ -101,13 +101,8 @@ def _scheduled(cast: policies.Cast, seed: int) -> Switch:
   from lfgp_dmc.agents.schedulers import make_scheduler
   from lfgp_dmc.launch import configs
 
-  stored = {
-    name: value
-    for name, value in cast.config.items()
-    if name not in run_folder.ADDED_FIELDS
-  }
   try:
-    agent = configs.from_dict(stored).agent
+    agent = configs.from_dict(run_folder.settings(cast.config)).agent
     periods = -(-agent.episode_steps // agent.xi)
     scheduler = make_scheduler(
       agent, cast.tasks, 0, periods, np.random.default_rng(seed)

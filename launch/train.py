@@ -76,10 +76,8 @@ def _config() -> configs.RunConfig:
     if config_flags.is_given():
       return config_flags.resolved()
     stored = run_folder.read_config(_RUN.value)
-    for name in run_folder.ADDED_FIELDS:
-      stored.pop(name, None)
     try:
-      return configs.from_dict(stored)
+      return configs.from_dict(run_folder.settings(stored))
     except ValueError as error:
       raise UserError(f"{_RUN.value}/config.json: {error}") from None
 

@@ -69,13 +69,14 @@ class Replay(Ring):
     folder = pathlib.Path(folder)
     found = _read_sidecar(folder)
     capacity, size = found["capacity"], found["size"]
-    widths = [
+    observation_size, action_size = (
       mapped_rows.open_rows(folder / f"{name}.npy", (size, None), True).shape[1]
       for name in ("observation", "action")
-    ]
+    )
     return cls(
       capacity,
-      *widths,
+      observation_size,
+      action_size,
       folder,
       reward_tasks=found["reward_tasks"],
       slack=size - capacity,

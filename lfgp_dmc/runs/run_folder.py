@@ -15,9 +15,10 @@ from typing import Any
 from lfgp_dmc.data import files
 
 CONFIG_NAME = "config.json"
-# What the run itself adds to the config that it was started with: the policy's
-# widths and tasks, so that a run's folder is a policy folder too.
-ADDED_FIELDS = ("policy",)
+ARRAYS_NAME = "policy.safetensors"
+# The run adds this to its config: what goes with the policy's arrays, so that a
+# run's folder is a policy folder too.
+POLICY_FIELD = "policy"
 
 
 class RunFolderError(ValueError):
@@ -108,16 +109,19 @@ def resume(
       the fields), or another process is running it.
   """
   path = pathlib.Path(path)
-  known = read_config(path)
-  known = complete({k: v for k, v in known.items() if k not in ADDED_FIELDS})
-  asked = {k: v for k, v in config.items() if k not in ADDED_FIELDS}
-  fields = differing_fields(known, asked)
+  known = complete(settings(read_config(path)))
+  fields = _differing_fields(known, settings(config))
   if fields:
     raise RunFolderError(
       f"{path} was started with another config; --resume keeps it. Differing: "
       + "; ".join(fields)
     )
   return RunFolder(path, _locked(path))
+
+
+def settings(config: Mapping[str, Any]) -> dict[str, Any]:
+  """What a run was started with: its config without what it added."""
+  return {k: v for k, v in config.items() if k != POLICY_FIELD}
 
 
 def read_config(path: files.Path) -> dict[str, Any]:
@@ -140,7 +144,7 @@ def read_config(path: files.Path) -> dict[str, Any]:
   return config
 
 
-def differing_fields(
+def _differing_fields(
   known: Mapping[str, Any], asked: Mapping[str, Any]
 ) -> list[str]:
   """What differs between two configs: `agent.xi (45, now 90)`, ..."""

@@ -8,10 +8,10 @@ import numpy as np
 from absl.testing import absltest
 
 from lfgp_dmc import toy
-from lfgp_dmc.data import csv_files, evaluation_csv
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.runs import checkpoints, loop, resuming, run_folder
-from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs import checkpoints, run, run_folder
 from lfgp_dmc.runs.schedule import TrainSchedule
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")
@@ -61,6 +61,12 @@ class _Agent:
     summed, self._summed = self._summed, 0.0
     return {"loss/critic": summed, "q/right": float(self._weights[0])}
 
+  def policy_arrays(self):
+    return {"weights": self._weights.copy()}
+
+  def policy_options(self):
+    return {"tasks": list(self.tasks)}
+
   def state_dict(self):
     return {
       "random": self._random.bit_generator.state,
@@ -77,37 +83,29 @@ class _Agent:
 class ResumingTest(absltest.TestCase):
   def _run(self, path: pathlib.Path, die_at=None, resume=False):
     """Trains 400 steps, or until the kill; a full ring with slack."""
-    open_run = run_folder.resume if resume else run_folder.create
-    run = open_run(path, _CONFIG)
-    replay = Replay(120, 2, 2, run.replay, slack=100)
-    agent = _Agent(replay, die_at)
-    log = MetricsLog(run.path)
-    progress = resuming.restore(run, agent, replay, log) if resume else None
-
-    def evaluate(step):
-      row = evaluation_csv.EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)
-      evaluation_csv.append_csv(run.evaluation, [row])
-      return {"right": 1.0}
-
-    schedule = TrainSchedule(
-      env_steps=400,
-      log_every=15,
-      evaluate_every=100,
-      checkpoint_every=60,
-      warmup_steps=30,
-      progress_bar=False,
-    )
-    loop.train(
-      toy.PointEnvironment(fail_every=0),
-      agent,
+    open_folder = run_folder.resume if resume else run_folder.create
+    folder = open_folder(path, _CONFIG)
+    replay = Replay(120, 2, 2, folder.replay, slack=100)
+    made = run.Run(
+      folder,
+      _Agent(replay, die_at),
+      toy.PointEnvironment(),
       replay,
-      schedule,
-      log,
-      evaluate,
-      lambda at: resuming.save(run, agent, replay, at, 400),
+      TrainSchedule(
+        env_steps=400,
+        log_every=15,
+        evaluate_every=100,
+        checkpoint_every=60,
+        warmup_steps=30,
+        progress_bar=False,
+      ),
+      lambda step: [EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)],
+      _CONFIG,
       seed=3,
-      progress=progress,
     )
+    if resume:
+      made.restore()
+    made.train()
 
   def _numbers(self, path: pathlib.Path):
     rows = csv_files.read(path / "metrics.csv")[1]
