@@ -2,11 +2,10 @@
 
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
-This is what `make demo` runs. It ends in one table of success on the same
-resets (untrained agent, its warm start by behaviour cloning, trained agent, a
-stored policy that was trained for longer, and the expert that they learned
-from), a figure, and a video that ends with the stored policy, in a new folder
-under runs/.
+This is `make demo`. It ends, in a new folder under runs/, in a table of success
+on the same resets (untrained agent, its warm start by cloning, trained agent,
+a stored policy trained for longer, the expert), a learning curve, and a video
+whose last clip is of the stored policy.
 """
 
 import dataclasses
@@ -17,7 +16,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import dm_env
 import numpy as np
 from absl import flags
 
@@ -56,22 +54,16 @@ def main() -> int:
   start = time.monotonic()
   with command.checked_input():
     config = config_flags.resolved()
-  path = pathlib.Path(_RUN.value) if _RUN.value else _default_path(config)
+  path = pathlib.Path(_RUN.value)
+  if not _RUN.value:
+    path = run_folder.default_path("quickstart", config.main_task)
   stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
   progress = training.train(config, path)
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
-  rows = evaluation_csv.read_csv(path / "evaluation.csv")
-  trained = [row for row in rows if row.env_step == progress.env_step]
-  columns = {
-    "untrained": _evaluate_untrained(config),
-    "warm start": [row for row in rows if row.env_step == 0],
-    "trained": trained,
-    **({"stored": _evaluate_stored(config, stored)} if stored else {}),
-    "expert": _evaluate_expert(config),
-  }
+  columns = _columns(config, path, stored)
   figure = learning_curve.learning_curve(
     [path / "evaluation.csv"],
     path / "learning_curve.png",
@@ -110,21 +102,30 @@ def table(
   return "\n".join(lines)
 
 
-def _default_path(config: RunConfig) -> pathlib.Path:
-  return run_folder.default_path("quickstart", config.main_task)
-
-
-def _evaluate_untrained(config: RunConfig) -> list[EvaluationRow]:
-  print("evaluating the untrained agent on the same resets", flush=True)
+def _columns(
+  config: RunConfig, path: pathlib.Path, stored: policies.Cast | None
+) -> dict[str, list[EvaluationRow]]:
+  """The table's columns: every policy on the same resets."""
+  rows = evaluation_csv.read_csv(path / "evaluation.csv")
+  last = max(row.env_step for row in rows)
+  tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
-    return _evaluate(config, functools.partial(policies.stored_policy, folder))
-
-
-def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
-  print("evaluating the scripted expert on the same resets", flush=True)
-  expert = functools.partial(policies.scripted_expert, config.control_hz)
-  return _evaluate(config, expert)
+    make = functools.partial(policies.stored_policy, folder)
+    untrained = _evaluate(config, "the untrained agent", make, tasks)
+  columns = {
+    "untrained": untrained,
+    "warm start": [row for row in rows if row.env_step == 0],
+    "trained": [row for row in rows if row.env_step == last],
+  }
+  if stored is not None:
+    able = [task for task in tasks if task in stored.tasks]
+    world = _world(config, stored)
+    name = str(stored.folder)
+    columns["stored"] = _evaluate(config, name, stored.make, able, world)
+  make = functools.partial(policies.scripted_expert, config.control_hz)
+  columns["expert"] = _evaluate(config, "the scripted expert", make, tasks)
+  return columns
 
 
 def _stored_policy(main_task: str) -> policies.Cast | None:
@@ -145,14 +146,6 @@ def _stored_policy(main_task: str) -> policies.Cast | None:
   return cast
 
 
-def _evaluate_stored(
-  config: RunConfig, stored: policies.Cast
-) -> list[EvaluationRow]:
-  print(f"evaluating {stored.folder} on the same resets", flush=True)
-  able = [t for t in task_names.task_set(config.main_task) if t in stored.tasks]
-  return _evaluate(config, stored.make, _world(config, stored), able)
-
-
 def _world(config: RunConfig, stored: policies.Cast) -> World:
   """The run's environment, at the control rate of the stored policy."""
   return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
@@ -160,14 +153,16 @@ def _world(config: RunConfig, stored: policies.Cast) -> World:
 
 def _evaluate(
   config: RunConfig,
+  name: str,
   make_actor: Callable[[], Actor],
+  tasks: Sequence[str],
   world: World | None = None,
-  tasks: Sequence[str] = (),
 ) -> list[EvaluationRow]:
+  print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(
     (world or config.world).factory(show_rewards=True),
     make_actor,
-    tasks or task_names.task_set(config.main_task),
+    tasks,
     config.evaluation_episodes,
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
@@ -221,7 +216,7 @@ def _play(
       environment,
       actor,
       environment.reset(),
-      functools.partial(_one_task, row.task),
+      lambda *_, task=row.task: task,
       seed,
       recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_SECONDS * world.control_hz,
@@ -246,10 +241,6 @@ def choose_episodes(
     return row.task != main_task, not row.success, "gripper" in row.task
 
   return sorted(best.values(), key=rank)[:_CLIPS]
-
-
-def _one_task(task: str, step: int, timestep: dm_env.TimeStep) -> str:
-  return task
 
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@
     timestep = environment.reset()
     action = act(lfgp_dmc.flatten(timestep.observation))
 
-This facade is the one file of the core that reaches `tasks` and `agents`, and
-only inside its functions: importing it loads neither a simulator nor torch.
+This facade reaches `tasks` and `agents` inside its functions only: importing it
+loads neither a simulator nor torch.
 """
 
 import os

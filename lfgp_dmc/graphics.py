@@ -1,8 +1,8 @@
 """Chooses how MuJoCo draws, which is fixed once it has been imported.
 
-MuJoCo and dm_control read `MUJOCO_GL` at their first import. With no display
-and no choice they take GLFW, warn, and fail at the first picture; so whoever
-imports them first calls `choose_backend` before.
+MuJoCo and dm_control read `MUJOCO_GL` at their first import; with neither a
+display nor a choice they fail at the first picture. So `choose_backend` comes
+before that import.
 """
 
 import ctypes
@@ -56,7 +56,7 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
 
 
 def fault() -> str:
-  """Why this process cannot draw, and what to do; empty if it can."""
+  """Why this process cannot draw, and what helps; empty if it can."""
   chosen = os.environ.get(_GL, "").lower().strip()
   if chosen in _OFF:
     return f"no pictures: MUJOCO_GL is {chosen!r}; " + (

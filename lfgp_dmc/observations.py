@@ -1,8 +1,7 @@
-"""The 59 floats that every task and every agent share: one layout, one place.
+"""The layout of the 59 floats that all tasks and agents share.
 
-The order is the released code's, so that published data line up. An
-observation of our environments also carries `success/<task>` and
-`condition/<task>`, which are not part of the 59.
+The order is the released code's, so that published data line up. Observations
+also carry `success/<task>` and `condition/<task>`, which are not of the 59.
 """
 
 from collections.abc import Mapping

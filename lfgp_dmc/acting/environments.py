@@ -1,9 +1,8 @@
 """How any dm_env environment is read: flat observations, widths, rewards.
 
-Our nine tasks are laid out in the order of `observations.py`. Every other
-environment gets its floating-point observables end to end, in the order of its
-own specification; what belongs to tasks (`success/`, `condition/`, `reward/`)
-is never part of what a policy sees.
+Our nine tasks are laid out in the order of `observations.py`, every other
+environment's floating-point observables in the order of its specification. What
+belongs to tasks (`success/`, `condition/`, `reward/`) is never an input.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -76,8 +75,8 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
     tasks: K names.
 
   Returns:
-    float32 [K]: the observable `reward/<task>`, or where the environment does
-    not show it, the environment's own reward.
+    float32 [K]: the observable `reward/<task>`, or without one the
+    environment's own reward.
   """
   own = 0.0 if timestep.reward is None else float(timestep.reward)
   shown = timestep.observation
@@ -90,10 +89,9 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
 def tasks_with_rewards(
   environment: dm_env.Environment, tasks: Sequence[str]
 ) -> tuple[str, ...]:
-  """All tasks whose reward the environment shows, or else `tasks`.
+  """`tasks`, then all others whose reward is an observable.
 
-  A replay that keeps the rewards of all of them can be carried over to any
-  of these tasks without a simulator.
+  A replay that keeps all of these can be transferred to any of the tasks.
   """
   spec = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
@@ -106,7 +104,7 @@ def tasks_with_rewards(
 
 
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:
-  """Whether `task` has succeeded; None if the environment cannot tell."""
+  """Whether `task` has succeeded; None if it is not observable."""
   shown = timestep.observation
   if not isinstance(shown, Mapping):
     return None

@@ -1,7 +1,7 @@
 """Evaluation: fixed seeded episodes of every intention, one row an episode.
 
-Episode i starts from a reset that depends on (seed, i) alone: not on the task,
-the method, the episodes before it, or how many processes share the work.
+The reset of episode i depends on (seed, i) alone: not on the task, the method,
+the episodes before it, or the number of processes.
 """
 
 import contextlib
@@ -34,11 +34,10 @@ def evaluate(
   """Plays `episodes` whole episodes of each task in one environment.
 
   Args:
-    make_environment: builds the main task's environment, with the observables
-      `reward/<task>` switched on where it has them. One without `reseed` is
-      built anew each episode with `seed=` if the factory takes that.
-    make_actor: builds the actor. With several workers both must be importable:
-      module-level functions, or `functools.partial` of them.
+    make_environment: builds the main task's environment, which observes
+      `reward/<task>` if it can. One without `reseed` is built anew each
+      episode, with `seed=` if the factory takes it.
+    make_actor: builds the actor. With several workers both must be picklable.
     tasks: the intentions to evaluate.
     episodes: episodes a task.
     seed: the evaluation's own seed.
@@ -68,7 +67,7 @@ def evaluate(
 
 
 class _Player:
-  """An environment and an actor, built once and used for many episodes."""
+  """An environment and an actor for many episodes."""
 
   def __init__(self, make_environment, make_actor, seed: int, env_step: int):
     self._make_environment = make_environment

@@ -25,7 +25,7 @@ class EvaluationRow(NamedTuple):
   task: str
   episode: int
   seed: int
-  success: int | None  # 0 or 1; None: the environment cannot tell
+  success: int | None  # 0 or 1; None: not observable
   steps_to_success: int | None  # control steps until the first success
   episode_return: float  # column `return`: undiscounted reward of that task
 
@@ -53,7 +53,7 @@ def read_csv(path: files.Path) -> list[EvaluationRow]:
 
 
 def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
-  """Task -> share of its episodes that succeeded; NaN if it cannot be told."""
+  """Task -> share of successful episodes; NaN if they cannot be observed."""
   rates = {}
   for task in dict.fromkeys(row.task for row in rows):
     known = [

@@ -1,7 +1,6 @@
 """A run's folder: `config.json`, CSVs, `checkpoints/`, `replay/`.
 
-A folder belongs to one process at a time: it holds a lock on `run.lock`, which
-the system releases however the process ends.
+It belongs to one process at a time, by a lock on `run.lock`.
 """
 
 import dataclasses
@@ -16,13 +15,13 @@ from lfgp_dmc.data import files
 
 CONFIG_NAME = "config.json"
 ARRAYS_NAME = "policy.safetensors"
-# The run adds this to its config: what goes with the policy's arrays, so that a
-# run's folder is a policy folder too.
+# Added to the config by the run: the options of the policy's arrays, so that
+# its folder is a policy folder too.
 POLICY_FIELD = "policy"
 
 
 class RunFolderError(ValueError):
-  """A run folder that cannot be used as asked; the message says why."""
+  """A run folder that cannot be used so; the message says why."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -169,7 +168,7 @@ def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def _locked(path: pathlib.Path):
-  """An open file whose lock keeps other processes off the folder."""
+  """An open file whose lock the system releases however the process ends."""
   file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
   try:
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
