@@ -1,13 +1,13 @@
 """The replay: ring, sampling, withdrawing, mapped files."""
 
 import json
-import pathlib
 
 import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
+from tests import fixtures
 
 
 def _transition(number: float) -> Transition:
@@ -109,10 +109,10 @@ class ReplayTest(parameterized.TestCase):
       Replay(4, 3, 2).gather_rewards(np.array([0]))
 
 
-class MappedReplayTest(absltest.TestCase):
+class MappedReplayTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path) / "replay"
+    self._folder = self.folder / "replay"
 
   def test_a_flushed_replay_reopens_with_its_rows(self):
     replay = Replay(6, 3, 2, self._folder)
@@ -171,12 +171,6 @@ class MappedReplayTest(absltest.TestCase):
     Replay(4, 3, 2, self._folder, reward_tasks=("lift", "reach")).flush()
     with self.assertRaisesRegex(ValueError, "expected .*'reach', 'lift'"):
       Replay(4, 3, 2, self._folder, reward_tasks=("reach", "lift"))
-
-
-class StoredReplayTest(absltest.TestCase):
-  def setUp(self):
-    super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path) / "replay"
 
   def test_holds_the_rows_that_could_be_sampled(self):
     replay = Replay(4, 3, 2, self._folder, slack=2, reward_tasks=("a", "b"))

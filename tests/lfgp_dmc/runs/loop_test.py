@@ -1,7 +1,6 @@
 """The training loop on the toy world with a toy agent."""
 
 import os
-import pathlib
 import signal
 
 import numpy as np
@@ -13,16 +12,14 @@ from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from tests import fixtures
 
 
-class _Agent:
-  """Acts at random, learns nothing, and remembers what was asked of it."""
-
-  tasks = toy.TASKS
+class _Agent(fixtures.ToyAgent):
+  """Remembers the calls, and in which order they come."""
 
   def __init__(self, on_act=None):
-    self.random = np.random.default_rng(0)
-    self.updates = 0
+    super().__init__()
     self.prepared = self.begun = 0
     self.episodes = []
     self.on_act = on_act
@@ -39,22 +36,15 @@ class _Agent:
     assert observation.shape == (2,) and observation.dtype == np.float32
     if self.on_act:
       self.on_act()
-    return self.random.uniform(-0.5, 0.5, 2).astype(np.float32)
+    return super().act(observation)
 
   def end_episode(self, episode):
     self.episodes.append(episode)
 
-  def update(self):
-    self.updates += 1
 
-  def metrics(self):
-    return {"loss/critic": float(self.updates)}
-
-
-class LoopTest(absltest.TestCase):
+class LoopTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
     self._evaluated, self._saved = [], []
 
   def _train(self, agent, environment=None, progress=None, **schedule):
@@ -72,14 +62,14 @@ class LoopTest(absltest.TestCase):
       agent,
       self._replay,
       TrainSchedule(**options),
-      MetricsLog(self._folder),
+      MetricsLog(self.folder),
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.update)),
       progress=progress,
     )
 
   def _rows(self):
-    return csv_files.read(self._folder / "metrics.csv")[1]
+    return csv_files.read(self.folder / "metrics.csv")[1]
 
   def test_everything_happens_when_due(self):
     agent = _Agent()
@@ -97,6 +87,9 @@ class LoopTest(absltest.TestCase):
     )
     self.assertEqual(rows[-1]["update"], "91")
     self.assertEqual(rows[-1]["replay_size"], "100")
+    self.assertIn("steps_per_s", rows[0])
+      list(rows[0])[2:5], ["wall_s", "steps_per_s", "updates_per_s"]
+    )
 
   def test_the_replay_holds_what_happened(self):
     agent = _Agent()
@@ -140,9 +133,10 @@ class LoopTest(absltest.TestCase):
     )
 
   def test_random_steps_draw_wide_actions(self):
-    self._train(_Agent(), random_steps=100)
-    actions = self._replay.gather(np.arange(100)).action
-    self.assertGreater(np.abs(actions).max(), 0.9)
+    self._train(_Agent(), random_steps=40)
+    actions = np.abs(self._replay.gather(np.arange(100)).action)
+    self.assertGreater(actions[:40].max(), 0.9)
+    self.assertLessEqual(actions[40:].max(), 0.5)
 
   def test_a_signal_finishes_the_episode_and_resume_goes_on(self):
     agent = _Agent()
@@ -151,7 +145,6 @@ class LoopTest(absltest.TestCase):
       if agent.begun == 2 and agent.updates == 15
       else None
     )
-    agent.updates = 0
     with self.assertLogs(level="WARNING"):
       progress = self._train(agent, checkpoint_every=1000)
     self.assertEqual(progress.env_step, 40)
