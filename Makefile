@@ -8,6 +8,7 @@
 
 BIN := .venv/bin
 STAMP := .venv/.set-up
+LAID_OUT := .venv/laid_out/lfgp_dmc
 PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || \
 	echo python3)
 TORCH_OPTIONS ?=
@@ -32,7 +33,12 @@ demo: setup
 test: setup
 	$(BIN)/python -m pytest tests
 
+# mypy does not read how pyproject.toml maps folders to import names: it gets a
+# folder of links in which they are laid out so.
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	rm -rf $(LAID_OUT) && mkdir -p $(LAID_OUT)
+	ln -s $(CURDIR)/lfgp_dmc/* $(addprefix $(CURDIR)/,agents launch tasks) \
+		$(LAID_OUT)
 	$(BIN)/mypy

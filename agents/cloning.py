@@ -6,14 +6,14 @@ from typing import Any
 
 import torch
 
-from agents import serialisation
-from agents.experts import ExpertBatch
-from agents.losses.behaviour_cloning import (
+from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.demonstration_pool import ExpertBatch
+from lfgp_dmc.agents.losses.behaviour_cloning import (
   behaviour_cloning_loss,
   likelihood_loss,
 )
-from agents.networks.intentions import IntentionNetwork
-from agents.optimisation import (
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork
+from lfgp_dmc.agents.optimisation import (
   clipped_step,
   make_optimiser,
   product_dtype,

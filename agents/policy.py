@@ -11,10 +11,10 @@ import safetensors
 import safetensors.numpy
 import torch
 
-from agents import serialisation
-from agents.networks import layouts
-from agents.networks.intentions import IntentionNetwork, to_deviation
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_deviation
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 ARRAYS_FILE = "policy.safetensors"
 CONFIG_FILE = "config.json"

@@ -14,9 +14,9 @@ from collections.abc import Iterator
 from absl import flags
 
 import lfgp_dmc
-from launch import command, config_flags, configs
-from launch.command import UserError
-from lfgp_dmc import files
+from lfgp_dmc.data import files
+from lfgp_dmc.launch import command, config_flags, configs
+from lfgp_dmc.launch.command import UserError
 
 _DEFAULT_STEPS = {
   "environment": 7_200,
@@ -83,23 +83,23 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
   steps = _STEPS.value or _DEFAULT_STEPS[_WHAT.value]
   match _WHAT.value:
     case "environment":
-      from launch.benchmarks import environment
+      from lfgp_dmc.launch.benchmarks import environment
 
       yield from environment.measure(steps, _SEED.value)
     case "learner":
-      from launch.benchmarks import learner
+      from lfgp_dmc.launch.benchmarks import learner
 
       yield from learner.measure(config, _SECONDS.value)
     case "training":
-      from launch.benchmarks import training
+      from lfgp_dmc.launch.benchmarks import training
 
       yield from training.measure(config, steps, _SECONDS.value)
     case "memory":
-      from launch.benchmarks import memory
+      from lfgp_dmc.launch.benchmarks import memory
 
       yield from memory.measure(config, steps)
     case "stability":
-      from launch.benchmarks import stability
+      from lfgp_dmc.launch.benchmarks import stability
 
       yield from stability.measure(_TASKS.value, steps, _SEED.value)
 

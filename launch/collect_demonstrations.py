@@ -11,9 +11,10 @@ import tempfile
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, command
-from lfgp_dmc import collection, demonstrations
-from lfgp_dmc.collection_attempts import Plan
+from lfgp_dmc.acting import collection
+from lfgp_dmc.acting.attempts import Plan
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
 
@@ -61,9 +62,9 @@ def sampling_actor(make_policy) -> Actor:
 def main() -> int:
   """Collects, writes and tells what it wrote."""
   output, tasks = _check_flags()
-  cast = actors.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
+  cast = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
   make_actor = cast.make
-  if _EXPERT.value != actors.SCRIPTED:
+  if _EXPERT.value != policies.SCRIPTED:
     make_actor = functools.partial(sampling_actor, cast.make)
   all_tasks = lfgp_dmc.task_set(_TASK.value)
   if cast.world.control_hz != _HERTZ.value:

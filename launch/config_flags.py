@@ -13,7 +13,7 @@ from typing import Any
 from absl import flags
 from ml_collections import config_flags
 
-from launch import configs
+from lfgp_dmc.launch import configs
 
 
 def define(

@@ -14,9 +14,9 @@ import pathlib
 
 from absl import flags
 
-from launch import command
-from launch.command import UserError
-from lfgp_dmc import demonstrations
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import command
+from lfgp_dmc.launch.command import UserError
 
 _DATASET = flags.DEFINE_string("dataset", "", "Our dataset folder.")
 _MINARI = flags.DEFINE_string("minari", "", "Minari's namespace for it.")
@@ -35,7 +35,7 @@ def main() -> None:
   try:
     import minari
 
-    from lfgp_dmc import minari_datasets
+    from lfgp_dmc.data import minari_datasets
   except ImportError as error:
     raise UserError(f"{error}; pip install 'lfgp-dmc[minari]'") from None
   folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"

@@ -5,10 +5,10 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-from launch.command import UserError
-from launch.configs import ALGORITHMS, RunConfig
-from lfgp_dmc import demonstrations, published_examples
-from lfgp_dmc.demonstrations import Demonstrations
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
 _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 
@@ -42,8 +42,7 @@ def load(
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
   if config.mirror_demonstrations:
-    # The room of the tasks imports MuJoCo, whose backend is chosen before.
-    from tasks import mirror
+    from lfgp_dmc.tasks import mirror
 
     found = mirror.with_images(found)
   return found
@@ -79,6 +78,9 @@ def _read(
   folder: pathlib.Path, tasks: Sequence[str], widths: tuple[int, int]
 ) -> dict[str, Demonstrations]:
   """Reads our own files, or a folder of published examples of success."""
+  # The room of the tasks imports MuJoCo, whose backend is chosen before.
+  from lfgp_dmc.tasks import published_examples
+
   if published_examples.is_folder_of_examples(folder):
     return published_examples.read_folder(folder, tasks)
   return demonstrations.read_folder(folder, tasks, *widths)

@@ -21,19 +21,15 @@ import dm_env
 import numpy as np
 from absl import flags
 
-from launch import actors, clips, command, config_flags, training
-from launch.configs import RunConfig
-from launch.worlds import World
-from lfgp_dmc import (
-  evaluation,
-  figures,
-  graphics,
-  run_folder,
-  seeding,
-  task_names,
-  video,
-)
-from lfgp_dmc.evaluation import EvaluationRow
+from lfgp_dmc import graphics, seeding, task_names
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.launch import command, config_flags, policies, training
+from lfgp_dmc.launch.configs import RunConfig
+from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.pictures import recorder, video
+from lfgp_dmc.runs import run_folder
+from lfgp_dmc.study import learning_curve
 from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
@@ -75,7 +71,7 @@ def main() -> int:
     **({"stored": _evaluate_stored(config, stored)} if stored else {}),
     "expert": _evaluate_expert(config),
   }
-  figure = figures.learning_curve(
+  figure = learning_curve.learning_curve(
     [path / "evaluation.csv"],
     path / "learning_curve.png",
     f"{config.algorithm} on {config.main_task}".replace("_", " "),
@@ -120,16 +116,16 @@ def _evaluate_untrained(config: RunConfig) -> list[EvaluationRow]:
   print("evaluating the untrained agent on the same resets", flush=True)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
-    return _evaluate(config, functools.partial(actors.stored_policy, folder))
+    return _evaluate(config, functools.partial(policies.stored_policy, folder))
 
 
 def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
   print("evaluating the scripted expert on the same resets", flush=True)
-  expert = functools.partial(actors.scripted_expert, config.control_hz)
+  expert = functools.partial(policies.scripted_expert, config.control_hz)
   return _evaluate(config, expert)
 
 
-def _stored_policy(main_task: str) -> actors.Cast | None:
+def _stored_policy(main_task: str) -> policies.Cast | None:
   """The policy to show beside the fresh one, if there is any.
 
   Raises:
@@ -138,7 +134,7 @@ def _stored_policy(main_task: str) -> actors.Cast | None:
   folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
-  cast = actors.find(folder, "")
+  cast = policies.find(folder, "")
   if main_task not in cast.tasks:
     raise command.UserError(
       f"--stored={folder} cannot do {main_task}; it can do: "
@@ -148,14 +144,14 @@ def _stored_policy(main_task: str) -> actors.Cast | None:
 
 
 def _evaluate_stored(
-  config: RunConfig, stored: actors.Cast
+  config: RunConfig, stored: policies.Cast
 ) -> list[EvaluationRow]:
   print(f"evaluating {stored.folder} on the same resets", flush=True)
   able = [t for t in task_names.task_set(config.main_task) if t in stored.tasks]
   return _evaluate(config, stored.make, _world(config, stored), able)
 
 
-def _world(config: RunConfig, stored: actors.Cast) -> World:
+def _world(config: RunConfig, stored: policies.Cast) -> World:
   """The run's environment, at the control rate of the stored policy."""
   return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
 
@@ -180,7 +176,7 @@ def _film(
   config: RunConfig,
   path: pathlib.Path,
   columns: Mapping[str, Sequence[EvaluationRow]],
-  stored: actors.Cast | None,
+  stored: policies.Cast | None,
 ) -> pathlib.Path | None:
   """Renders evaluated episodes again: of the main task, then of others.
 
@@ -190,7 +186,7 @@ def _film(
   if graphics.fault():
     return None
   chosen = choose_episodes(config.main_task, columns["trained"])
-  frames = _play(config.world, actors.stored_policy(str(path)), chosen)
+  frames = _play(config.world, policies.stored_policy(str(path)), chosen)
   shown = [(path.name, row) for row in chosen]
   if stored is not None:
     best = choose_episodes(config.main_task, columns["stored"])[:1]
@@ -219,13 +215,13 @@ def _play(
   for row in episodes:
     seed = seeding.derive(row.seed, "evaluation", row.episode)
     environment.reseed(seed)
-    clip = clips.record(
+    clip = recorder.record(
       environment,
       actor,
       environment.reset(),
       functools.partial(_one_task, row.task),
       seed,
-      clips.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
+      recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_SECONDS * world.control_hz,
       until_success_of=row.task,
     )

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, command
-from launch.command import UserError
-from lfgp_dmc import evaluation
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.launch import command, policies
+from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.task_names import CONTROL_RATES
 
 _NAME = "evaluation.csv"
@@ -70,12 +70,12 @@ def main() -> None:
     print(f"\n{output}")
 
 
-def _plan() -> list[tuple[actors.Cast, tuple[str, ...]]]:
+def _plan() -> list[tuple[policies.Cast, tuple[str, ...]]]:
   """Who plays which tasks; an expert each task in its own environment."""
   if _RUN.value or not _EXPERT.value:
-    cast = actors.find(_RUN.value, _EXPERT.value)
+    cast = policies.find(_RUN.value, _EXPERT.value)
     return [(cast, choose_tasks(_TASKS.value, cast.tasks))]
-  command.check_choice("expert", _EXPERT.value, (actors.SCRIPTED,))
+  command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   own = _MAIN_TASK.value
   if own:
     command.check_choice("main_task", own, lfgp_dmc.ALL_TASKS)
@@ -88,8 +88,8 @@ def _plan() -> list[tuple[actors.Cast, tuple[str, ...]]]:
   return [(_scripted(task), (task,)) for task in tasks]
 
 
-def _scripted(task: str) -> actors.Cast:
-  return actors.find("", actors.SCRIPTED, task, _HERTZ.value)
+def _scripted(task: str) -> policies.Cast:
+  return policies.find("", policies.SCRIPTED, task, _HERTZ.value)
 
 
 def choose_tasks(

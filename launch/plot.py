@@ -20,18 +20,12 @@ from collections.abc import Sequence
 
 from absl import flags
 
-from launch import command
-from launch.command import UserError
-from lfgp_dmc import (
-  aggregates,
-  csv_files,
-  dataset_table,
-  figures,
-  files,
-  run_folder,
-  study,
-  study_figures,
-)
+from lfgp_dmc import dataset_table
+from lfgp_dmc.data import csv_files, files
+from lfgp_dmc.launch import command
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.runs import run_folder
+from lfgp_dmc.study import aggregates, figures, learning_curve, run_results
 
 _EACH, _DATASETS, _BOTH = "runs", "datasets", "both"
 
@@ -44,11 +38,14 @@ _OUTPUT = flags.DEFINE_string("output", "results", "Folder for the figures.")
 _FIGURE = flags.DEFINE_enum(
   "figure",
   _EACH,
-  [_EACH, *study_figures.PLANS, _DATASETS],
+  [_EACH, *figures.PLANS, _DATASETS],
   "Which figure; see above.",
 )
 _QUANTITY = flags.DEFINE_enum(
-  "quantity", study.SUCCESS, study.QUANTITIES, "What --figure=runs draws."
+  "quantity",
+  run_results.SUCCESS,
+  run_results.QUANTITIES,
+  "What --figure=runs draws.",
 )
 _ESTIMATE = flags.DEFINE_enum(
   "estimate", _BOTH, [*aggregates.ESTIMATES, _BOTH], "How seeds become a line."
@@ -78,12 +75,12 @@ def _draw_each(folders: Sequence[str], output: pathlib.Path) -> None:
   """A figure for each algorithm and main task."""
   groups = defaultdict(list)
   with command.checked_input():
-    for folder in study.expanded(folders):
+    for folder in run_results.expanded(folders):
       config = run_folder.read_config(folder)
       path = folder / "evaluation.csv"
       if not path.is_file():
         raise UserError(f"{path} is missing: nothing was evaluated yet")
-      key = (study.method_of(config), config.get("main_task", "?"))
+      key = (run_results.method_of(config), config.get("main_task", "?"))
       groups[key].append(path)
   for (method, main_task), paths in groups.items():
     stem = f"{method}_{main_task}_{_QUANTITY.value}.{_FORMAT.value}"
@@ -91,21 +88,23 @@ def _draw_each(folders: Sequence[str], output: pathlib.Path) -> None:
     title = f"{method} on {main_task}{count}".replace("_", " ")
     with command.checked_input():
       print(
-        figures.learning_curve(paths, output / stem, title, _QUANTITY.value)
+        learning_curve.learning_curve(
+          paths, output / stem, title, _QUANTITY.value
+        )
       )
 
 
 def _draw_study(folders: Sequence[str], output: pathlib.Path) -> None:
   """One of the paper's figures."""
   with command.checked_input():
-    runs, notes = study.read_runs(folders)
+    runs, notes = run_results.read_runs(folders)
   kinds = [_ESTIMATE.value]
   if _ESTIMATE.value == _BOTH:
     kinds = list(aggregates.ESTIMATES)
   for kind in kinds:
     path = output / f"{_FIGURE.value}_{kind}.{_FORMAT.value}"
     with command.checked_input():
-      notes += study_figures.draw(_FIGURE.value, runs, path, kind)
+      notes += figures.draw(_FIGURE.value, runs, path, kind)
     print(path)
   for note in dict.fromkeys(notes):
     print(f"note: {note}")

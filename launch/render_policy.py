@@ -24,10 +24,11 @@ import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, clips, command, playing, strips
-from launch.command import UserError
-from launch.worlds import World
-from lfgp_dmc import graphics, seeding, video
+from lfgp_dmc import graphics, seeding
+from lfgp_dmc.launch import command, film_strips, policies, task_switch
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.pictures import recorder, video
 from lfgp_dmc.task_names import CONTROL_RATES
 
 _RUN = flags.DEFINE_string(
@@ -96,7 +97,7 @@ def main() -> None:
   if task and (_EXPERT.value or _WHAT.value == "reset"):
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
   if _EXPERT.value:
-    command.check_choice("expert", _EXPERT.value, (actors.SCRIPTED,))
+    command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   elif _COLLECTION.value == "play":
     raise UserError("--collection=play needs --expert=scripted")
   if _WHAT.value == "strips":
@@ -110,14 +111,14 @@ def main() -> None:
 def _film(task: str, rows: int, columns: int) -> None:
   """An episode, or a grid of them."""
   is_play = _COLLECTION.value == "play"
-  cast = actors.find(_RUN.value, _EXPERT.value, task, _HERTZ.value)
+  cast = policies.find(_RUN.value, _EXPERT.value, task, _HERTZ.value)
   task = task or cast.main_task
-  if task != playing.SCHEDULED:
-    command.check_choice("task", task, (*cast.tasks, playing.SCHEDULED))
+  if task != task_switch.SCHEDULED:
+    command.check_choice("task", task, (*cast.tasks, task_switch.SCHEDULED))
   output = _checked_output(f"{cast.name}_{'play' if is_play else task}")
   world = _checked_world(cast.world)
   played = [
-    strips.play(
+    film_strips.play(
       cast,
       task,
       seed,
@@ -155,22 +156,22 @@ def _film(task: str, rows: int, columns: int) -> None:
 def _film_strips() -> None:
   """A row of frames for each main task."""
   if _EXPERT.value:
-    casts = [actors.find("", _EXPERT.value, t) for t in lfgp_dmc.MAIN_TASKS]
+    casts = [policies.find("", _EXPERT.value, t) for t in lfgp_dmc.MAIN_TASKS]
     if _TASK.value:
-      casts = [actors.find("", _EXPERT.value, _TASK.value)]
+      casts = [policies.find("", _EXPERT.value, _TASK.value)]
   else:
-    casts = [actors.find(run, "") for run in _RUN.value.split(",")]
+    casts = [policies.find(run, "") for run in _RUN.value.split(",")]
   output = _checked_output("strips", (".png",))
   for cast in casts:
     _checked_world(cast.world).close()
-  look = clips.Look(
+  look = recorder.Look(
     _HEIGHT.value,
     _WIDTH.value,
     _CAMERA.value,
     overlay=False,
     shadows=_SHADOWS.value,
   )
-  picture, shown = strips.rows(
+  picture, shown = film_strips.rows(
     casts, _SEED.value, look, _STRIP.value, _ATTEMPTS.value
   )
   video.write(output, [picture], metadata={"rows": shown})
@@ -182,28 +183,28 @@ def _picture_of_reset(task: str, rows: int, columns: int) -> None:
   output = _checked_output(f"reset_{task}", (".png",))
   environment = _checked_world(World(task))
   look = _look(rows, columns)
-  clips.prepare(environment, look)
+  recorder.prepare(environment, look)
   pictures = []
   for seed in range(_SEED.value, _SEED.value + rows * columns):
     environment.reseed(seeding.derive(seed, "clip"))
     environment.reset()
-    pictures.append([clips.picture(environment, look)])
+    pictures.append([recorder.picture(environment, look)])
   metadata = {"task": task, "seed": _SEED.value, "camera": _CAMERA.value}
   video.write(output, video.grid(pictures, columns), metadata=metadata)
   print(output)
 
 
-def _description(clip: clips.Clip, seed: int) -> dict[str, Any]:
+def _description(clip: recorder.Clip, seed: int) -> dict[str, Any]:
   return {
     "seed": seed,
     "steps": clip.steps,
     "first_success": clip.first_success,
-    "intentions": playing.spans(clip.labels, _EVERY.value / clip.checks),
+    "intentions": task_switch.spans(clip.labels, _EVERY.value / clip.checks),
   }
 
 
-def _look(rows: int, columns: int) -> clips.Look:
-  return clips.Look(
+def _look(rows: int, columns: int) -> recorder.Look:
+  return recorder.Look(
     max(32, _HEIGHT.value // rows),
     max(32, _WIDTH.value // columns),
     _CAMERA.value,
@@ -228,7 +229,9 @@ def _checked_world(world: World):
   if fault:
     raise UserError(fault)
   environment = world.build()
-  command.check_choice("camera", _CAMERA.value, playing.cameras(environment))
+  command.check_choice(
+    "camera", _CAMERA.value, task_switch.cameras(environment)
+  )
   return environment
 
 

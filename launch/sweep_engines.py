@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from absl import logging
 
-from launch.command import UserError
+from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
 _CHILD = pathlib.Path(__file__).with_name("sweep_child.py")

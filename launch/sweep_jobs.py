@@ -11,7 +11,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from lfgp_dmc import csv_files, evaluation, run_folder
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.runs import run_folder
 from lfgp_dmc.task_names import ALL_TASKS
 
 FLAGS = pathlib.Path(__file__).with_name("flags")

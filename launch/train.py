@@ -12,9 +12,10 @@ import pathlib
 
 from absl import flags
 
-from launch import command, config_flags, configs, training
-from launch.command import UserError
-from lfgp_dmc import evaluation, loop, run_folder
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.launch import command, config_flags, configs, training
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.runs import loop, run_folder
 
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."

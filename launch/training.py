@@ -10,25 +10,24 @@ import dm_env
 import safetensors.numpy
 import torch
 
-from launch import actors, command, datasets, starting, worlds
-from launch.command import UserError
-from launch.configs import ALGORITHMS, RunConfig, from_dict
-from lfgp_dmc import (
-  environments,
-  evaluation,
-  files,
-  loop,
-  resuming,
-  run_folder,
-  seeding,
-  supervised,
-  task_names,
+from lfgp_dmc import seeding, task_names
+from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.data import files
+from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch import (
+  command,
+  datasets,
+  environment_spec,
+  initialise_run,
+  policies,
 )
-from lfgp_dmc.demonstrations import Demonstrations
-from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig, from_dict
 from lfgp_dmc.remote_acting import RemoteActor
-from lfgp_dmc.replay import Replay
-from lfgp_dmc.run_folder import RunFolder
+from lfgp_dmc.runs import loop, resuming, run_folder, supervised
+from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.run_folder import RunFolder
 
 _ARRAYS = "policy.safetensors"
 _DETERMINISTIC_CUBLAS = ":4096:8"
@@ -91,7 +90,7 @@ def tasks_of(
   if not ALGORITHMS[config.algorithm].is_multitask:
     return (config.main_task,)
   if config.environment:
-    return worlds.tasks_of(environment, config.main_task)
+    return environment_spec.tasks_of(environment, config.main_task)
   return task_names.task_set(config.main_task)
 
 
@@ -130,7 +129,7 @@ def evaluate_policy(
   """Plays the stored policy: every task, the config's episodes and seed."""
   return evaluation.evaluate(
     config.world.factory(show_rewards=True),
-    functools.partial(actors.stored_policy, os.fspath(folder)),
+    functools.partial(policies.stored_policy, os.fspath(folder)),
     tasks,
     config.evaluation_episodes,
     config.evaluation_seed,
@@ -190,7 +189,7 @@ class _Run:
 
   def start(self) -> None:
     """Takes over what the config says from other runs and policies."""
-    starting.start(self._config, self._agent, self._replay)
+    initialise_run.start(self._config, self._agent, self._replay)
 
   def restore(self) -> None:
     """Goes back to the last good checkpoint, or to the start without one."""
@@ -240,7 +239,7 @@ class _Run:
     config = self._config
     return RemoteActor(
       config.world.factory(config.keeps_rewards),
-      functools.partial(actors.sampling_policy, self._agent.policy_options()),
+      functools.partial(policies.sampling_policy, self._agent.policy_options()),
       reward_tasks,
     )
 

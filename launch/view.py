@@ -11,10 +11,11 @@ import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from launch import actors, command
-from launch.command import UserError
-from launch.worlds import World
-from lfgp_dmc import environments, graphics
+from lfgp_dmc import graphics
+from lfgp_dmc.acting import environments
+from lfgp_dmc.launch import command, policies
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.environment_spec import World
 
 _TASK = flags.DEFINE_string(
   "task", "", "The task to look at; with --run, the intention that acts."
@@ -32,8 +33,8 @@ def main() -> None:
   cast = None
   if _RUN.value or _EXPERT.value:
     if _EXPERT.value:
-      command.check_choice("expert", _EXPERT.value, (actors.SCRIPTED,))
-    cast = actors.find(_RUN.value, _EXPERT.value, task)
+      command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
+    cast = policies.find(_RUN.value, _EXPERT.value, task)
     task = task or cast.main_task
     command.check_choice("task", task, cast.tasks)
   if not graphics.has_display():
@@ -44,7 +45,7 @@ def main() -> None:
   _open(cast, task or lfgp_dmc.MAIN_TASKS[0])
 
 
-def _open(cast: actors.Cast | None, task: str) -> None:
+def _open(cast: policies.Cast | None, task: str) -> None:
   from dm_control import viewer
 
   world = cast.world if cast else World(task)

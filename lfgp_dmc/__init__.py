@@ -26,12 +26,7 @@ from lfgp_dmc.observations import (
   flatten,
   successes,
 )
-from lfgp_dmc.task_names import (
-  ALL_TASKS,
-  AUXILIARY_TASKS,
-  MAIN_TASKS,
-  task_set,
-)
+from lfgp_dmc.task_names import ALL_TASKS, AUXILIARY_TASKS, MAIN_TASKS, task_set
 
 if TYPE_CHECKING:
   from lfgp_dmc.vector import VectorEnvironment
@@ -71,7 +66,7 @@ def load(
     ValueError: an unknown task, option or value; the message lists the valid.
   """
   graphics.choose_backend()  # before the first import of MuJoCo
-  import tasks
+  from lfgp_dmc import tasks
 
   return tasks.load(task, seed=seed, **options)
 
@@ -124,7 +119,7 @@ def load_policy(
     ValueError: the folder holds no policy, or the policy has no intention of
       that name; the message names the file, or lists the intentions.
   """
-  from agents.policy import Policy
+  from lfgp_dmc.agents.policy import Policy
 
   policy = Policy.load(os.fspath(run_folder))
   task = policy.tasks[0] if task is None else task

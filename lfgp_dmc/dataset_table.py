@@ -8,7 +8,7 @@ import pathlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from lfgp_dmc import demonstrations, files
+from lfgp_dmc.data import demonstrations, files
 from lfgp_dmc.task_names import MAIN_TASKS
 
 COLUMNS = ("class", "main_task", "collection", "dataset", "tasks",

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import dm_env
 import numpy as np
 
-from lfgp_dmc import environments, seeding, workers
+from lfgp_dmc import seeding
+from lfgp_dmc.acting import environments, workers
 from lfgp_dmc.types import Actor, Agent, Step, Transition
 
 MakeActor = Callable[[Mapping[str, np.ndarray]], Actor]

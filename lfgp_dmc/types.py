@@ -55,7 +55,7 @@ class Actor(Protocol):
 
 
 class Agent(Protocol):
-  """A learner as the training loop sees it; see `lfgp_dmc/loop.py`."""
+  """A learner as the training loop sees it; see `lfgp_dmc/runs/loop.py`."""
 
   tasks: tuple[str, ...]
 

@@ -14,7 +14,7 @@ from typing import Any
 import dm_env
 import numpy as np
 
-from lfgp_dmc import workers
+from lfgp_dmc.acting import workers
 
 _STEP_TYPE, _REWARD, _DISCOUNT = "step_type", "reward", "discount"
 _OBSERVATION = "observation/"  # before the names of observables

@@ -1,5 +1,5 @@
 """The simulator side: entities, control, the nine tasks, scripted experts."""
 
-from tasks.registry import load
+from lfgp_dmc.tasks.registry import load
 
 __all__ = ["load"]

@@ -3,7 +3,7 @@
 import numpy as np
 from dm_control import composer
 
-from tasks import workspace as ws
+from lfgp_dmc.tasks import workspace as ws
 
 _TABLE_HALF = (0.5, 0.75)  # m
 _TABLE_TOP_HALF = 0.015  # m

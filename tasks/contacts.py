@@ -6,8 +6,8 @@ environment's simulator multiplies them, so every pair states its own.
 
 import itertools
 
-from tasks.arena import PlayArena
-from tasks.entities import Block, Panda, Tray
+from lfgp_dmc.tasks.arena import PlayArena
+from lfgp_dmc.tasks.entities import Block, Panda, Tray
 
 # Sliding friction coefficients: products of the released environment's.
 BLOCK_TRAY = 0.42

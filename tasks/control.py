@@ -13,9 +13,9 @@ import math
 import numpy as np
 from dm_control import mjcf
 
-from tasks import workspace as ws
-from tasks.entities.panda import Panda
-from tasks.entities.panda_links import FINGER_TRAVEL
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.entities.panda import Panda
+from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL
 
 ACTION_SIZE = 4
 SPEED = 0.2  # m/s of the set-point at |a| = 1: 1 cm per 50 ms

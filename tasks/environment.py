@@ -9,9 +9,9 @@ from dm_control import composer
 from dm_control.composer import observation
 from dm_control.rl import control
 
-from tasks import workspace as ws
-from tasks.initialisers import Start
-from tasks.play import PlayTask
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.initialisers import Start
+from lfgp_dmc.tasks.play import PlayTask
 
 
 class _OncePerStepUpdater(observation.Updater):

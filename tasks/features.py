@@ -10,11 +10,11 @@ import numpy as np
 from dm_control import mjcf
 
 from lfgp_dmc.observations import OBSERVATION_SIZE
-from lfgp_dmc.rotations import reduce_rotation
-from tasks import workspace as ws
-from tasks.entities import Block, Panda, Tray
-from tasks.entities.panda_links import FINGER_TRAVEL
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.entities import Block, Panda, Tray
+from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL
+from lfgp_dmc.tasks.rotations import reduce_rotation
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 _WRENCH_SCALE = np.array([100.0] * 3 + [10.0] * 3)  # N, N m
 

@@ -18,7 +18,7 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics
-from lfgp_dmc.environments import REWARD_PREFIX
+from lfgp_dmc.acting.environments import REWARD_PREFIX
 from lfgp_dmc.observations import (
   CONDITION_PREFIX,
   OBSERVATION_SIZE,

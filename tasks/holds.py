@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from tasks.goals import Goal
+from lfgp_dmc.tasks.goals import Goal
 
 
 class Holds:

@@ -10,9 +10,9 @@ import numpy as np
 from dm_control import mjcf
 from dm_control.utils import inverse_kinematics
 
-from tasks import workspace as ws
-from tasks.entities import Panda
-from tasks.entities.panda_links import FINGER_TRAVEL, HOME
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.entities import Panda
+from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL, HOME
 
 SPAWNS = ("published", "full_tray")
 

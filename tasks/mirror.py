@@ -9,9 +9,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lfgp_dmc.demonstrations import Demonstrations
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.observations import OBSERVATION_SIZE, OBSERVATION_SLICES
-from tasks import workspace as ws
+from lfgp_dmc.tasks import workspace as ws
 
 # By component: the signs of a vector's floats across the plane, and those of
 # what turns (rotations, angular velocities, torques), which flip the others.

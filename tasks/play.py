@@ -16,12 +16,12 @@ from lfgp_dmc.observations import (
   components,
 )
 from lfgp_dmc.task_names import MAIN_TASKS
-from tasks import control, initialisers
-from tasks import workspace as ws
-from tasks.arena import FRONT_CAMERA, PlayArena
-from tasks.goals import GOALS, terms
-from tasks.holds import Holds
-from tasks.world import World
+from lfgp_dmc.tasks import control, initialisers
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.arena import FRONT_CAMERA, PlayArena
+from lfgp_dmc.tasks.goals import GOALS, terms
+from lfgp_dmc.tasks.holds import Holds
+from lfgp_dmc.tasks.world import World
 
 REWARDS = ("sparse", "dense")
 OBSERVATIONS = ("features", "vision")

@@ -2,8 +2,8 @@
 
 import math
 
-from tasks import workspace as ws
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 NEAR = 0.10  # m, TCP to block: "remaining reasonably close"
 SLOW = 0.08  # m/s, TCP

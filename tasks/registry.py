@@ -1,9 +1,9 @@
 """Environments by task name."""
 
 from lfgp_dmc.task_names import CONTROL_RATES, check_task
-from tasks.environment import PlayEnvironment
-from tasks.initialisers import SPAWNS
-from tasks.play import OBSERVATIONS, REWARDS, PlayTask
+from lfgp_dmc.tasks.environment import PlayEnvironment
+from lfgp_dmc.tasks.initialisers import SPAWNS
+from lfgp_dmc.tasks.play import OBSERVATIONS, REWARDS, PlayTask
 
 
 def load(

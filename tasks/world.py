@@ -1,11 +1,11 @@
 """Everything that is in the play world, put together."""
 
-from tasks import contacts
-from tasks import workspace as ws
-from tasks.arena import PlayArena
-from tasks.control import SetPointControl
-from tasks.entities import Block, Panda, Slot, Tray, Zone
-from tasks.features import FeatureReader
+from lfgp_dmc.tasks import contacts
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.arena import PlayArena
+from lfgp_dmc.tasks.control import SetPointControl
+from lfgp_dmc.tasks.entities import Block, Panda, Slot, Tray, Zone
+from lfgp_dmc.tasks.features import FeatureReader
 
 
 class World:

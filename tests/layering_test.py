@@ -16,14 +16,22 @@ _FORBIDDEN = {
   "agents": {"tasks", "launch", *_SIMULATOR},
   "launch": set(),
 }
+# Parts of the import name `lfgp_dmc` that are rooms of their own.
+_PARTS = [[room] for room in _FORBIDDEN if room != "lfgp_dmc"]
+
+
+def _room(module: str) -> str:
+  """The room of a dotted import name, or a stranger's top-level package."""
+  first, *rest = module.split(".")
+  return rest[0] if first == "lfgp_dmc" and rest[:1] in _PARTS else first
 
 
 def _roots(node: ast.AST) -> set[str]:
-  """Top-level packages that an import statement names."""
+  """Rooms and top-level packages that an import statement names."""
   if isinstance(node, ast.Import):
-    return {alias.name.partition(".")[0] for alias in node.names}
+    return {_room(alias.name) for alias in node.names}
   if isinstance(node, ast.ImportFrom) and not node.level:
-    return {(node.module or "").partition(".")[0]}
+    return {_room(f"{node.module}.{alias.name}") for alias in node.names}
   return set()
 
 
@@ -59,13 +67,15 @@ class LayeringTest(parameterized.TestCase):
     eager, lazy = _imports(
       "import a.b\nif x:\n  from c import d\nclass E:\n  def f(self):\n"
       "    import g\n    def h():\n      from i.j import k\n"
+      "    from lfgp_dmc import tasks\n    import lfgp_dmc.agents.bc\n"
     )
-    self.assertEqual((eager, lazy), ({"a", "c"}, {"g", "i"}))
+    self.assertEqual((eager, lazy), ({"a", "c"}, {"g", "i", "tasks", "agents"}))
 
   def test_importing_the_facade_loads_neither_simulator_nor_torch(self):
     code = (
-      "import sys, lfgp_dmc, lfgp_dmc.loop, lfgp_dmc.evaluation\n"
-      "heavy = {'torch', 'mujoco', 'dm_control', 'tasks', 'agents'}\n"
+      "import sys, lfgp_dmc, lfgp_dmc.runs.loop, lfgp_dmc.acting.evaluation\n"
+      "heavy = {'torch', 'mujoco', 'dm_control', 'lfgp_dmc.tasks',"
+      " 'lfgp_dmc.agents'}\n"
       "found = heavy & set(sys.modules)\n"
       "sys.exit(str(found) if found else 0)"
     )

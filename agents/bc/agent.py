@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 import torch
 
-from agents import serialisation
-from agents.bc.config import BcConfig
-from agents.bc.pairs import SplitPairs
-from agents.cloning import IntentionCloner, cloning_loss
-from agents.experts import (
+from lfgp_dmc import seeding
+from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.bc.config import BcConfig
+from lfgp_dmc.agents.bc.pairs import SplitPairs
+from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
+from lfgp_dmc.agents.demonstration_pool import (
   DemonstrationArrays,
   check_sizes,
   pooled_observations,
 )
-from agents.metering import Meter
-from agents.networks import layouts
-from agents.networks.intentions import IntentionNetwork, to_deviation
-from agents.networks.trunk import Standardiser
-from agents.policy import Policy
-from lfgp_dmc import seeding
+from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_deviation
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.types import Metrics
 
 _LOSS = "behaviour_cloning"

@@ -2,8 +2,8 @@
 
 import dataclasses
 
-from agents import cloning, field_checks
-from agents.networks import layouts
+from lfgp_dmc.agents import cloning, field_checks
+from lfgp_dmc.agents.networks import layouts
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import torch
 
-from agents.experts import DemonstrationArrays, ExpertBatch
+from lfgp_dmc.agents.demonstration_pool import DemonstrationArrays, ExpertBatch
 
 
 class SplitPairs:

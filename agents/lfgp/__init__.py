@@ -1,7 +1,7 @@
 """Learning from Guided Play: the paper's agent (Algorithm 1)."""
 
-from agents.lfgp.agent import LfgpAgent
-from agents.lfgp.builder import build
-from agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.agent import LfgpAgent
+from lfgp_dmc.agents.lfgp.builder import build
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
 
 __all__ = ["LfgpAgent", "LfgpConfig", "build"]

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import tqdm
 
-from agents import cloning, serialisation
-from agents.experts import ExpertPool
-from agents.lfgp import carrying, warm_start
-from agents.lfgp.batches import BatchMaker, Replay, reward_columns
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import LfgpLearner
-from agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
-from agents.metering import Meter
-from agents.policy import Policy
-from agents.schedulers import Scheduler, period_returns
 from lfgp_dmc import seeding
+from lfgp_dmc.agents import cloning, serialisation
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp import pretraining, transfer
+from lfgp_dmc.agents.lfgp.batches import BatchMaker, Replay, reward_columns
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.learner import LfgpLearner
+from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
+from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.agents.schedulers import Scheduler, period_returns
 from lfgp_dmc.types import Episode, Metrics, Period
 
 
@@ -96,7 +96,7 @@ class LfgpAgent:
       ValueError: it has other sizes, or none of our tasks.
     """
     self._check_common(policy.tasks, "the policy")
-    carrying.carry_heads(
+    transfer.carry_heads(
       self.learner.networks.intentions,
       policy.arrays(),
       self.tasks,
@@ -125,7 +125,7 @@ class LfgpAgent:
     """
     self._check_common(source_tasks, "the other run")
     own = self.learner.networks
-    carrying.carry_networks(own, networks, self.tasks, source_tasks)
+    transfer.carry_networks(own, networks, self.tasks, source_tasks)
     self._refresh_inputs()
     if set(self.tasks) - set(source_tasks):
       self._first_updates = self._config.transfer_updates
@@ -141,7 +141,7 @@ class LfgpAgent:
     config, intentions = self._config, self.learner.networks.intentions
     if config.bc_warm_start_updates:
       assert self._experts is not None, "a warm start needs demonstrations"
-      warm_start.clone(
+      pretraining.clone(
         config, intentions, self._experts, self._sampling, progress_bar
       )
       self.learner.adopt_intention_trunk()
@@ -150,7 +150,7 @@ class LfgpAgent:
       config.prior_weight > 0 and config.bc_loss == cloning.LIKELIHOOD
     )
     if has_precise_prior and self._experts is not None:
-      warm_start.warn_of_precise_prior(
+      pretraining.warn_of_precise_prior(
         config, self.tasks, intentions, self._experts
       )
     for _ in tqdm.trange(

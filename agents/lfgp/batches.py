@@ -6,9 +6,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import torch
 
-from agents.experts import Batch, ExpertBatch, ExpertPool
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.device_rows import DeviceRows, RingReplay
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertBatch, ExpertPool
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.device_replay import DeviceRows, RingReplay
 
 
 class Replay(RingReplay, Protocol):

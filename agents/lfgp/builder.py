@@ -5,21 +5,21 @@ from collections.abc import Mapping, Sequence
 
 import torch
 
-from agents.experts import (
+from lfgp_dmc import seeding
+from lfgp_dmc.agents.demonstration_pool import (
   DemonstrationArrays,
   ExpertPool,
   check_sizes,
   pooled_observations,
 )
-from agents.lfgp.agent import LfgpAgent
-from agents.lfgp.batches import Replay
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import LfgpLearner
-from agents.lfgp.networks import make_networks
-from agents.lfgp.recording import CudaRecorder
-from agents.networks.trunk import Standardiser
-from agents.schedulers import make_scheduler
-from lfgp_dmc import seeding
+from lfgp_dmc.agents.lfgp.agent import LfgpAgent
+from lfgp_dmc.agents.lfgp.batches import Replay
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder
+from lfgp_dmc.agents.lfgp.learner import LfgpLearner
+from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.agents.schedulers import make_scheduler
 
 
 def build(

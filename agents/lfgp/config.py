@@ -4,8 +4,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from agents import cloning, field_checks, rewards, schedulers
-from agents.networks import discriminator, layouts
+from lfgp_dmc.agents import cloning, field_checks, rewards, schedulers
+from lfgp_dmc.agents.networks import discriminator, layouts
 
 ACTOR_TRUNKS = ("shared", "own")
 MIXINGS = ("float", "row")  # of replay and expert rows, for the penalty

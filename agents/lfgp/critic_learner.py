@@ -5,17 +5,21 @@ from typing import Any
 
 import torch
 
-from agents.experts import Batch
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.networks import LfgpNetworks
-from agents.losses.critic import (
+from lfgp_dmc.agents.demonstration_pool import Batch
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.losses.critic import (
   critic_loss,
   soft_bellman_target,
   value_penalty_loss,
 )
-from agents.networks import tanh_gaussian
-from agents.optimisation import clipped_step, make_optimiser, product_dtype
-from agents.value_bounds import ValueBounds
+from lfgp_dmc.agents.networks import tanh_gaussian
+from lfgp_dmc.agents.optimisation import (
+  clipped_step,
+  make_optimiser,
+  product_dtype,
+)
+from lfgp_dmc.agents.value_bounds import ValueBounds
 
 Metrics = dict[str, torch.Tensor]
 

@@ -2,17 +2,17 @@
 
 import torch
 
-from agents.experts import Batch, ExpertBatch
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.networks import LfgpNetworks
-from agents.losses.discriminator import (
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertBatch
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.losses.discriminator import (
   discriminator_loss,
   gradient_penalty_loss,
   mix,
 )
-from agents.networks.discriminator import Discriminator
-from agents.optimisation import make_optimiser, product_dtype
-from agents.rewards import reward_from_logits
+from lfgp_dmc.agents.networks.discriminator import Discriminator
+from lfgp_dmc.agents.optimisation import make_optimiser, product_dtype
+from lfgp_dmc.agents.rewards import reward_from_logits
 
 Metrics = dict[str, torch.Tensor]
 

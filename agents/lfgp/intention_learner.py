@@ -2,14 +2,14 @@
 
 import torch
 
-from agents.experts import Batch, ExpertBatch
-from agents.lfgp.cloning_terms import CloningTerms
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.networks import LfgpNetworks
-from agents.losses.intention import intention_loss
-from agents.losses.temperature import temperature_loss
-from agents.networks import tanh_gaussian
-from agents.optimisation import (
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertBatch
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.lfgp.prior import CloningTerms
+from lfgp_dmc.agents.losses.intention import intention_loss
+from lfgp_dmc.agents.losses.temperature import temperature_loss
+from lfgp_dmc.agents.networks import tanh_gaussian
+from lfgp_dmc.agents.optimisation import (
   clipped_step,
   frozen,
   make_optimiser,

@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 import numpy as np
 import torch
 
-from agents import serialisation
-from agents.experts import Batch, ExpertBatch
-from agents.lfgp.batches import Draw
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.critic_learner import CriticLearner
-from agents.lfgp.discriminator_learner import DiscriminatorLearner
-from agents.lfgp.intention_learner import IntentionLearner
-from agents.lfgp.networks import LfgpNetworks
-from agents.lfgp.recording import RecordedUpdates, Recorder
-from agents.optimisation import frozen, polyak
-from agents.rewards import bounded, reward_from_examples
+from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertBatch
+from lfgp_dmc.agents.lfgp.batches import Draw
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.critic_learner import CriticLearner
+from lfgp_dmc.agents.lfgp.cuda_graphs import RecordedUpdates, Recorder
+from lfgp_dmc.agents.lfgp.discriminator_learner import DiscriminatorLearner
+from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.optimisation import frozen, polyak
+from lfgp_dmc.agents.rewards import bounded, reward_from_examples
 
 Metrics = dict[str, torch.Tensor]
 

@@ -7,13 +7,13 @@ from typing import TypeVar
 import torch
 from torch import nn
 
-from agents import field_checks
-from agents.lfgp.config import LfgpConfig
-from agents.networks import layouts
-from agents.networks.critics import CriticNetwork
-from agents.networks.discriminator import Discriminator
-from agents.networks.intentions import IntentionNetwork
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import field_checks
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.critics import CriticNetwork
+from lfgp_dmc.agents.networks.discriminator import Discriminator
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 _Network = TypeVar("_Network", bound=nn.Module)
 

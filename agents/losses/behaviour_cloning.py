@@ -2,7 +2,7 @@
 
 import torch
 
-from agents.networks import tanh_gaussian
+from lfgp_dmc.agents.networks import tanh_gaussian
 
 Metrics = dict[str, torch.Tensor]
 

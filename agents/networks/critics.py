@@ -4,7 +4,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from agents.networks.linear import StackedLinear, initialise_
+from lfgp_dmc.agents.networks.linear import StackedLinear, initialise_
 
 
 class TwinCriticHeads(nn.Module):

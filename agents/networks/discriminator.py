@@ -5,8 +5,11 @@ from collections.abc import Sequence
 import torch
 from torch import nn
 
-from agents.networks.discriminator_passes import DiscriminatorPasses, tanh_
-from agents.networks.linear import make_linear
+from lfgp_dmc.agents.networks.discriminator_passes import (
+  DiscriminatorPasses,
+  tanh_,
+)
+from lfgp_dmc.agents.networks.linear import make_linear
 
 INPUTS = ("state_action", "state")
 

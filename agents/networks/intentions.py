@@ -6,8 +6,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from agents.networks.linear import StackedLinear
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents.networks.linear import StackedLinear
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 DEVIATION_FLOOR = 1e-7  # the paper's epsilon against underflow
 

@@ -9,9 +9,9 @@ K = 1 the intention is O-H-H-2A, each critic (O + A)-H-H-1.
 import torch
 from torch import nn
 
-from agents.networks.critics import TwinCriticHeads
-from agents.networks.intentions import IntentionHeads
-from agents.networks.trunk import Trunk
+from lfgp_dmc.agents.networks.critics import TwinCriticHeads
+from lfgp_dmc.agents.networks.intentions import IntentionHeads
+from lfgp_dmc.agents.networks.trunk import Trunk
 
 SHARED_TRUNK, SEPARATE = "shared_trunk", "separate"
 LAYOUTS = (SHARED_TRUNK, SEPARATE)

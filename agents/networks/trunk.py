@@ -5,7 +5,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from agents.networks.linear import make_linear
+from lfgp_dmc.agents.networks.linear import make_linear
 
 
 class Standardiser(nn.Module):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from agents import serialisation
+from lfgp_dmc.agents import serialisation
 
 RESET = "reset"  # the row of an episode's first choice
 _SIXTH, _FIFTEENTH = 1 / 6, 1 / 15

@@ -5,14 +5,20 @@ from typing import Protocol
 
 import numpy as np
 
-from agents.schedulers.base import Scheduler
-from agents.schedulers.conditional import ConditionalWeighted, table_for
-from agents.schedulers.handcrafted import (
+from lfgp_dmc.agents.schedulers.base import Scheduler
+from lfgp_dmc.agents.schedulers.conditional import (
+  ConditionalWeighted,
+  table_for,
+)
+from lfgp_dmc.agents.schedulers.handcrafted import (
   WeightedRandomHandcrafted,
   sequences_for,
 )
-from agents.schedulers.q_table import QTable
-from agents.schedulers.weighted_random import WeightedRandom, main_weights
+from lfgp_dmc.agents.schedulers.q_table import QTable
+from lfgp_dmc.agents.schedulers.weighted_random import (
+  WeightedRandom,
+  main_weights,
+)
 
 NAMES = (
   "q_table",  # learned (the paper's LfGP)

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from agents import serialisation
-from agents.schedulers.weighted_random import WeightedRandom
+from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.schedulers.weighted_random import WeightedRandom
 
 MAIN = "main"  # stands for the main task, whichever it is
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from agents import serialisation
+from lfgp_dmc.agents import serialisation
 
 
 class WeightedRandom:

@@ -74,7 +74,7 @@ def _physics_alone(environment, steps: int, seed: int) -> float:
   """Seconds of the physics of `steps` control steps, replayed."""
   import mujoco
 
-  from tasks import experts
+  from lfgp_dmc.tasks import experts
 
   expert = experts.make_expert()
   model, data = environment.physics.model.ptr, environment.physics.data.ptr

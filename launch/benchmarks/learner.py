@@ -10,10 +10,10 @@ from unittest import mock
 import numpy as np
 import torch
 
-from agents import synthetic
-from launch.benchmarks.operations import gflop_of_update
-from launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc import observations, task_names
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.launch.benchmarks.operations import gflop_of_update
+from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
 _ACTION_SIZE = 4
 _PAIRS = 2_000  # a task

@@ -8,11 +8,11 @@ import numpy as np
 import torch
 import tqdm
 
-from agents import synthetic
-from launch.benchmarks import learner
-from launch.configs import RunConfig
 from lfgp_dmc import observations
-from lfgp_dmc.replay import Replay
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch.benchmarks import learner
+from lfgp_dmc.launch.configs import RunConfig
 
 _ACTION_SIZE = 4
 _CHUNK = 50_000  # rows filled at a time

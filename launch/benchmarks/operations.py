@@ -6,8 +6,8 @@ input gradient alone once), and the gradient penalty, itself differentiated
 twice, six times its forward pass.
 """
 
-from agents.lfgp import LfgpConfig
-from agents.networks import layouts
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.networks import layouts
 
 
 def gflop_of_update(

@@ -6,7 +6,8 @@ import numpy as np
 import tqdm
 
 import lfgp_dmc
-from lfgp_dmc import environments, seeding
+from lfgp_dmc import seeding
+from lfgp_dmc.acting import environments
 
 _HELD = 0.1  # chance of a new action, in every other episode
 

@@ -8,13 +8,14 @@ from collections.abc import Iterator
 import torch
 
 import lfgp_dmc
-from launch import actors
-from launch.benchmarks import learner
-from launch.configs import RunConfig
-from lfgp_dmc import loop, observations
-from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc import observations
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch import policies
+from lfgp_dmc.launch.benchmarks import learner
+from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.remote_acting import RemoteActor
-from lfgp_dmc.replay import Replay
+from lfgp_dmc.runs import loop
+from lfgp_dmc.runs.metrics import MetricsLog
 
 _ACTION_SIZE = 4
 _EPISODE = 360
@@ -72,7 +73,7 @@ def measure(
 def _remote_actor(config: RunConfig, agent) -> RemoteActor:
   return RemoteActor(
     functools.partial(lfgp_dmc.load, config.main_task),
-    functools.partial(actors.sampling_policy, agent.policy_options()),
+    functools.partial(policies.sampling_policy, agent.policy_options()),
   )
 
 

@@ -4,9 +4,9 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from agents import bc, lfgp
-from agents.bc import BcAgent, BcConfig
-from agents.lfgp import LfgpAgent, LfgpConfig
+from lfgp_dmc.agents import bc, lfgp
+from lfgp_dmc.agents.bc import BcAgent, BcConfig
+from lfgp_dmc.agents.lfgp import LfgpAgent, LfgpConfig
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,7 +18,9 @@ class Algorithm:
   build: Callable[..., LfgpAgent | BcAgent]  # see `agents.lfgp.build`
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
   is_multitask: bool = True  # learns all of `task_set`, or the main task alone
-  is_supervised: bool = False  # by `lfgp_dmc/supervised.py`, without acting
+  is_supervised: bool = (
+    False  # by `lfgp_dmc/runs/supervised.py`, without acting
+  )
   run_defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
   def make_agent_config(self) -> Any:

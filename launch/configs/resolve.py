@@ -6,9 +6,9 @@ from typing import Any
 
 import ml_collections
 
-from launch.configs.algorithms import ALGORITHMS
-from launch.configs.presets import PRESETS
-from launch.configs.run_config import RunConfig
+from lfgp_dmc.launch.configs.algorithms import ALGORITHMS
+from lfgp_dmc.launch.configs.presets import PRESETS
+from lfgp_dmc.launch.configs.run_config import RunConfig
 
 
 def make_config(

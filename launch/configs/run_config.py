@@ -3,8 +3,8 @@
 import dataclasses
 from typing import Any
 
-from launch.configs import algorithms
-from launch.worlds import World
+from lfgp_dmc.launch.configs import algorithms
+from lfgp_dmc.launch.environment_spec import World
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
 

@@ -1,9 +1,9 @@
 """The bodies of the play world, one entity a file."""
 
-from tasks.entities.block import Block
-from tasks.entities.panda import Panda
-from tasks.entities.slot import Slot
-from tasks.entities.tray import Tray
-from tasks.entities.zone import Zone
+from lfgp_dmc.tasks.entities.block import Block
+from lfgp_dmc.tasks.entities.panda import Panda
+from lfgp_dmc.tasks.entities.slot import Slot
+from lfgp_dmc.tasks.entities.tray import Tray
+from lfgp_dmc.tasks.entities.zone import Zone
 
 __all__ = ["Block", "Panda", "Slot", "Tray", "Zone"]

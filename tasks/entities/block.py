@@ -3,7 +3,7 @@
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 
-from tasks import workspace
+from lfgp_dmc.tasks import workspace
 
 _MASS = 0.1  # kg
 

@@ -6,7 +6,7 @@ import rtbdata
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 
-from tasks.entities import panda_links as links
+from lfgp_dmc.tasks.entities import panda_links as links
 
 _MESHES = pathlib.Path(rtbdata.__file__).parent / "meshes/FRANKA-EMIKA/Panda"
 _WHITE = (0.93, 0.93, 0.94, 1.0)

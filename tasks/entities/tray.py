@@ -4,7 +4,7 @@ import math
 
 from dm_control import composer, mjcf
 
-from tasks import workspace as ws
+from lfgp_dmc.tasks import workspace as ws
 
 _BASE_HALF = 0.002  # m, half thickness of the slab under the pockets
 _WALL_HALF = 0.004  # m, half thickness of a sloped wall

@@ -3,7 +3,7 @@
 from dm_control import composer, mjcf
 from dm_control.composer.observation import observable
 
-from tasks import workspace
+from lfgp_dmc.tasks import workspace
 
 _THICKNESS = 0.0002  # m; visual only, just above the floor
 _DIM = 0.45  # share of the colour while empty

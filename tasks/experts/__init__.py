@@ -1,6 +1,6 @@
 """Scripted experts for the nine tasks, acting on the 59 floats alone."""
 
-from tasks.experts.expert import NOISE, POLICIES, ScriptedExpert
+from lfgp_dmc.tasks.experts.expert import NOISE, POLICIES, ScriptedExpert
 
 
 def make_expert(noise: float = NOISE, control_hz: int = 20) -> ScriptedExpert:

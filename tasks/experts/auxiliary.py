@@ -2,10 +2,15 @@
 
 import math
 
-from tasks import workspace as ws
-from tasks.experts import grasp, motion, place
-from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import View, across, is_between_fingers, is_held
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import grasp, motion, place
+from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
+from lfgp_dmc.tasks.experts.view import (
+  View,
+  across,
+  is_between_fingers,
+  is_held,
+)
 
 _NEAR = 0.07  # m, TCP to block
 _LIFT_Z = 0.272  # m, of the TCP

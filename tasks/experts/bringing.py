@@ -2,10 +2,10 @@
 
 import math
 
-from tasks import workspace as ws
-from tasks.experts import grasp, motion, place
-from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import BlockView, View, across, is_held
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import grasp, motion, place
+from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
+from lfgp_dmc.tasks.experts.view import BlockView, View, across, is_held
 
 _BROUGHT = 0.026  # m, horizontally, of a block that may stay
 _DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot

@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 
 from lfgp_dmc.task_names import ALL_TASKS
-from tasks.experts import auxiliary, bringing, stacking
-from tasks.experts.motion import Command
-from tasks.experts.view import View, look
+from lfgp_dmc.tasks.experts import auxiliary, bringing, stacking
+from lfgp_dmc.tasks.experts.motion import Command
+from lfgp_dmc.tasks.experts.view import View, look
 
 NOISE = 0.1  # standard deviation of the action noise, in units of the action
 

@@ -5,10 +5,10 @@ The fingers close along y and leave a gap of 8 cm when open.
 
 import math
 
-from tasks import workspace as ws
-from tasks.experts import motion
-from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import (
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import motion
+from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
+from lfgp_dmc.tasks.experts.view import (
   BlockView,
   View,
   across,

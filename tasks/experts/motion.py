@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from tasks.experts.view import Vector, View
+from lfgp_dmc.tasks.experts.view import Vector, View
 
 OPEN, CLOSE = -1, 1
 SPEED = 0.95  # |a| on a long way; 0.2 m/s at 1

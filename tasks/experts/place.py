@@ -2,10 +2,17 @@
 
 import math
 
-from tasks import workspace as ws
-from tasks.experts import grasp, motion
-from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import BlockView, Vector, View, across, is_held, is_on
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import grasp, motion
+from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
+from lfgp_dmc.tasks.experts.view import (
+  BlockView,
+  Vector,
+  View,
+  across,
+  is_held,
+  is_on,
+)
 
 _CARRY = 0.054  # m, a carried block's centre above the other's
 _ASIDE = 0.09  # m from blue along x, where green is set aside

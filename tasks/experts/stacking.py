@@ -2,9 +2,9 @@
 
 import math
 
-from tasks.experts import grasp, place
-from tasks.experts.motion import CLOSE, OPEN, Command
-from tasks.experts.view import View, is_held, is_on
+from lfgp_dmc.tasks.experts import grasp, place
+from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
+from lfgp_dmc.tasks.experts.view import View, is_held, is_on
 
 _ABOVE = 0.0405  # m, centre to centre, at which blue is let go
 _ALIGNED = 0.006  # m

@@ -1,13 +1,13 @@
 """The nine tasks' goals, by name."""
 
 from lfgp_dmc.task_names import ALL_TASKS
-from tasks.goals.bring import BRING, INSERT
-from tasks.goals.goal import Goal
-from tasks.goals.gripper import CLOSE_GRIPPER, OPEN_GRIPPER
-from tasks.goals.lift import LIFT
-from tasks.goals.move_object import MOVE_OBJECT
-from tasks.goals.reach import REACH
-from tasks.goals.stack import STACK, UNSTACK_STACK
+from lfgp_dmc.tasks.goals.bring import BRING, INSERT
+from lfgp_dmc.tasks.goals.goal import Goal
+from lfgp_dmc.tasks.goals.gripper import CLOSE_GRIPPER, OPEN_GRIPPER
+from lfgp_dmc.tasks.goals.lift import LIFT
+from lfgp_dmc.tasks.goals.move_object import MOVE_OBJECT
+from lfgp_dmc.tasks.goals.reach import REACH
+from lfgp_dmc.tasks.goals.stack import STACK, UNSTACK_STACK
 
 _ALL = (
   STACK,

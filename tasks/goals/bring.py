@@ -2,11 +2,11 @@
 
 import math
 
-from tasks import predicates
-from tasks import workspace as ws
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 BRING_RADIUS = 0.03  # m, to p_s
 INSERT_RADIUS = 0.0025  # m, to p_s: reached by an inserted block alone

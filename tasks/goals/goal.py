@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 Terms = dict[str, float]
 

@@ -2,10 +2,10 @@
 
 import math
 
-from tasks import predicates
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 
 def is_opening(state: Snapshot) -> bool:

@@ -1,9 +1,9 @@
 """Lift: the blue block is off the tray."""
 
-from tasks import predicates
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 _HEIGHT = 0.06  # m above where the block lies flat
 _TOP = 0.08  # m, where the dense reward is full

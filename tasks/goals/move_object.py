@@ -1,9 +1,9 @@
 """Move-Object: the blue block moves, smoothly, for a whole second."""
 
-from tasks import predicates
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 _SPEED = 0.05  # m/s
 _ACCELERATION = 5.0  # m/s^2

@@ -1,9 +1,9 @@
 """Reach: the TCP is at the blue block."""
 
-from tasks import predicates
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 _RADIUS = 0.015  # m
 

@@ -6,10 +6,10 @@ that does not lie flat.
 
 import math
 
-from tasks import predicates
-from tasks.goals import terms
-from tasks.goals.goal import Goal, Terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks.goals import terms
+from lfgp_dmc.tasks.goals.goal import Goal, Terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 _ABOVE_GREEN = 0.041  # m, centre to centre, of a block about to be let go
 _PLACED = 0.005  # m

@@ -2,9 +2,9 @@
 
 import math
 
-from tasks import predicates
-from tasks import workspace as ws
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import predicates
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 CLOSED_ON_BLOCK = (0.4, 0.7)  # finger openings around a 4 cm block
 _TIGHT = 0.01  # m, TCP to blue

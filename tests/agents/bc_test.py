@@ -6,11 +6,11 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.bc import BcConfig, build
-from agents.bc.pairs import SplitPairs
-from agents.policy import Policy
-from lfgp_dmc import nested
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.bc import BcConfig, build
+from lfgp_dmc.agents.bc.pairs import SplitPairs
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.runs import pytree
 
 TASKS = ("stack", "reach", "lift")
 OBS, A = 10, 4
@@ -180,8 +180,8 @@ class ContractTest(parameterized.TestCase):
     agent, other = _build(), _build(seed=3)
     for _ in range(2):
       _epoch(agent)
-    arrays, tree = nested.pack(agent.state_dict())
-    state = nested.unpack(arrays, json.loads(json.dumps(tree)))
+    arrays, tree = pytree.pack(agent.state_dict())
+    state = pytree.unpack(arrays, json.loads(json.dumps(tree)))
     other._pairs = agent._pairs  # the split follows from the seed
     other.load_state_dict(state)
     for one in (agent, other):

@@ -3,8 +3,8 @@
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
 
 OLD = ("move_object", "open_gripper", "reach")
 NEW = ("stack", "reach", "move_object", "lift")

@@ -4,7 +4,7 @@ import dataclasses
 
 from absl.testing import absltest, parameterized
 
-from agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
 
 
 class LfgpConfigTest(parameterized.TestCase):

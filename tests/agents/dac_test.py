@@ -4,10 +4,10 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
-from agents.networks import layouts
-from agents.policy import Policy
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.policy import Policy
 
 TASK = "stack"
 OBS, A, H = 59, 4, 32

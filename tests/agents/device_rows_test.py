@@ -4,9 +4,9 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from agents import synthetic
-from agents.lfgp.device_rows import DeviceRows
-from lfgp_dmc.replay import Replay
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp.device_replay import DeviceRows
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
 
 OBS, A = 3, 2

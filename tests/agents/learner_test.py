@@ -4,13 +4,13 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.experts import Batch, ExpertPool
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import LfgpLearner
-from agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
-from agents.lfgp.networks import make_networks
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertPool
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.learner import LfgpLearner
+from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
+from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 TASKS = ("main", "first", "second")
 OBS, A, B = 6, 2, 16

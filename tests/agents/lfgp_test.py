@@ -7,10 +7,10 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
-from agents.policy import Policy
-from lfgp_dmc import nested
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.runs import pytree
 from lfgp_dmc.types import Episode
 
 TASKS = ("stack", "open_gripper", "close_gripper", "reach", "lift")
@@ -264,8 +264,8 @@ class DeterminismTest(parameterized.TestCase):
   def test_resumed_agent_goes_on_bit_for_bit(self, **fields):
     agent = _build(3, **fields)
     _live(agent, episodes=2)
-    arrays, tree = nested.pack(agent.state_dict())
-    state = nested.unpack(arrays, json.loads(json.dumps(tree)))
+    arrays, tree = pytree.pack(agent.state_dict())
+    state = pytree.unpack(arrays, json.loads(json.dumps(tree)))
     resumed = _build(8, **fields)
     resumed.load_state_dict(state)
     np.testing.assert_array_equal(_live(agent, 2), _live(resumed, 2))

@@ -5,15 +5,15 @@ import math
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import rewards
-from agents.losses import (
+from lfgp_dmc.agents import rewards
+from lfgp_dmc.agents.losses import (
   behaviour_cloning,
   critic,
   discriminator,
   intention,
   temperature,
 )
-from agents.networks import tanh_gaussian
+from lfgp_dmc.agents.networks import tanh_gaussian
 
 LN2, LN3 = math.log(2), math.log(3)
 

@@ -4,8 +4,8 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
 
 TASKS = ("main", "open_gripper", "reach")
 OBS, A, B = 6, 2, 16

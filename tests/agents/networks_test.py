@@ -7,11 +7,11 @@ import torch
 from absl.testing import absltest, parameterized
 from torch.nn import functional
 
-from agents.networks.critics import CriticNetwork, TwinCriticHeads
-from agents.networks.discriminator import Discriminator
-from agents.networks.intentions import IntentionHeads, to_deviation
-from agents.networks.linear import StackedLinear
-from agents.networks.trunk import Standardiser, Trunk
+from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
+from lfgp_dmc.agents.networks.discriminator import Discriminator
+from lfgp_dmc.agents.networks.intentions import IntentionHeads, to_deviation
+from lfgp_dmc.agents.networks.linear import StackedLinear
+from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
 
 K, OBS, A, H, B = 3, 7, 2, 16, 5
 

@@ -7,12 +7,12 @@ import torch
 from absl.testing import absltest, parameterized
 from torch.nn import functional
 
-from agents import synthetic
-from agents.experts import Batch, ExpertPool
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import LfgpLearner
-from agents.lfgp.networks import make_networks
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.demonstration_pool import Batch, ExpertPool
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.learner import LfgpLearner
+from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 TASKS = ("main", "first", "second")
 K, OBS, A, H, B, N = len(TASKS), 59, 4, 32, 24, 16

@@ -8,9 +8,9 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from agents.networks.intentions import IntentionHeads, IntentionNetwork
-from agents.networks.trunk import Standardiser, Trunk
-from agents.policy import Policy
+from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
+from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
+from lfgp_dmc.agents.policy import Policy
 
 TASKS = ("main", "first")
 OBS, A, H = 5, 3, 8

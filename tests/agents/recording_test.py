@@ -11,13 +11,13 @@ from absl.testing import absltest, parameterized
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves, tree_map
 
-from agents import synthetic
-from agents.experts import ExpertPool
-from agents.lfgp.batches import BatchMaker
-from agents.lfgp.config import LfgpConfig
-from agents.lfgp.learner import LfgpLearner
-from agents.lfgp.networks import make_networks
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp.batches import BatchMaker
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp.learner import LfgpLearner
+from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.networks.trunk import Standardiser
 
 TASKS = ("main", "first", "second")
 OBS, A = 6, 2

@@ -6,11 +6,11 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from agents import rewards, synthetic
-from agents.experts import ExpertPool
-from agents.lfgp import LfgpConfig, build
-from agents.lfgp.batches import with_examples
-from agents.networks.trunk import Standardiser
+from lfgp_dmc.agents import rewards, synthetic
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.lfgp.batches import with_examples
+from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.types import Episode
 
 TASKS = ("stack", "reach", "lift")

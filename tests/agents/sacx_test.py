@@ -4,9 +4,11 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from agents.lfgp import LfgpConfig, build
-from lfgp_dmc import environments, evaluation, loop, metrics, toy
-from lfgp_dmc.replay import Replay
+from lfgp_dmc import toy
+from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import loop, metrics
 
 
 class SacxTest(absltest.TestCase):

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from agents import schedulers
-from agents.lfgp.config import LfgpConfig
-from agents.schedulers import conditional, handcrafted, q_table
-from lfgp_dmc import nested, task_names
+from lfgp_dmc import task_names
+from lfgp_dmc.agents import schedulers
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.schedulers import conditional, handcrafted, q_table
+from lfgp_dmc.runs import pytree
 
 
 class _Scripted:
@@ -173,8 +174,8 @@ class FactoryTest(parameterized.TestCase):
   def test_same_seed_same_choices_and_state_round_trip(self, name, main):
     first, second = _make(name, main), _make(name, main)
     self.assertEqual(_play(first), _play(second))
-    arrays, tree = nested.pack(first.state_dict())
-    state = nested.unpack(arrays, json.loads(json.dumps(tree)))
+    arrays, tree = pytree.pack(first.state_dict())
+    state = pytree.unpack(arrays, json.loads(json.dumps(tree)))
     third = _make(name, main, seed=7)
     third.load_state_dict(state)
     self.assertEqual(_play(first), _play(third))

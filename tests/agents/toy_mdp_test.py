@@ -3,10 +3,10 @@
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from agents import schedulers
-from agents.lfgp import LfgpConfig
-from agents.schedulers import q_table
 from lfgp_dmc import task_names
+from lfgp_dmc.agents import schedulers
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.schedulers import q_table
 
 TASKS = task_names.task_set("stack")
 STACK, LIFT = TASKS.index("stack"), TASKS.index("lift")

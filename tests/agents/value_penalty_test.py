@@ -6,10 +6,10 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
-from agents.losses.critic import critic_loss, value_penalty_loss
-from agents.value_bounds import ValueBounds
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.losses.critic import critic_loss, value_penalty_loss
+from lfgp_dmc.agents.value_bounds import ValueBounds
 
 _CPU = torch.device("cpu")
 

@@ -7,13 +7,15 @@ import torch
 from absl import logging
 from absl.testing import absltest, parameterized
 
-from agents import synthetic
-from agents.lfgp import LfgpConfig, build
-from agents.lfgp.cloning_terms import entropies
-from agents.policy import Policy
-from lfgp_dmc import collection, environments, evaluation, loop, metrics, toy
-from lfgp_dmc.collection_attempts import Plan
-from lfgp_dmc.replay import Replay
+from lfgp_dmc import toy
+from lfgp_dmc.acting import collection, environments, evaluation
+from lfgp_dmc.acting.attempts import Plan
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.lfgp.prior import entropies
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import loop, metrics
 
 TASKS = ("stack", "reach", "lift")
 OBS, A = 6, 2

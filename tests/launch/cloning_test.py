@@ -8,9 +8,11 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from agents.bc import BcAgent
-from launch import configs, training
-from lfgp_dmc import csv_files, evaluation, run_folder
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.agents.bc import BcAgent
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.launch import configs, training
+from lfgp_dmc.runs import run_folder
 from tests.launch import fixtures
 
 _RATES = ("wall_s", "updates_per_s")

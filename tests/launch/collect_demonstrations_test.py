@@ -10,11 +10,12 @@ import time
 import torch
 from absl.testing import absltest
 
-from agents.networks.intentions import IntentionHeads, IntentionNetwork
-from agents.networks.trunk import Standardiser, Trunk
-from agents.policy import Policy
-from launch import command
-from lfgp_dmc import demonstrations, task_names
+from lfgp_dmc import task_names
+from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
+from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import command
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 _SCRIPT = str(_ROOT / "launch" / "collect_demonstrations.py")

@@ -10,8 +10,10 @@ from concurrent import futures
 
 from absl.testing import absltest
 
-from launch import actors, command, training
-from lfgp_dmc import evaluation, graphics, task_names, video
+from lfgp_dmc import graphics, task_names
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.launch import command, policies, training
+from lfgp_dmc.pictures import video
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
@@ -166,7 +168,7 @@ class BlockRunTest(absltest.TestCase):
       text = json.dumps({**stored, **change})
       (policy / "config.json").write_text(text)
       with self.assertRaisesRegex(command.UserError, message):
-        actors.find("", str(policy))
+        policies.find("", str(policy))
 
   def test_plots(self):
     done = self._call("plot.py --runs=runs/tiny --output=figures")

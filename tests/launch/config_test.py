@@ -6,9 +6,9 @@ import pathlib
 from absl import flags
 from absl.testing import absltest, parameterized
 
-from agents.lfgp import LfgpConfig
-from launch import config_flags, configs
 from lfgp_dmc import task_names
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.launch import config_flags, configs
 
 _FLAGS = pathlib.Path(config_flags.__file__).parent / "flags"
 # Of runs: not the sweep, whose flags are launch/sweep.py's.

@@ -5,9 +5,10 @@ import pathlib
 
 import numpy as np
 
-from agents import synthetic
-from launch import configs
-from lfgp_dmc import demonstrations, toy
+from lfgp_dmc import toy
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import configs
 
 POINT = "lfgp_dmc.toy:PointEnvironment"
 

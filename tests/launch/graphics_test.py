@@ -7,8 +7,8 @@ from unittest import mock
 
 from absl.testing import absltest, parameterized
 
-from launch import set_up_graphics
 from lfgp_dmc import graphics
+from lfgp_dmc.launch import set_up_graphics
 
 _PRINT = (
   "import os; from lfgp_dmc import graphics; "

@@ -15,7 +15,7 @@ import time
 from absl import logging
 from absl.testing import absltest
 
-from lfgp_dmc import csv_files
+from lfgp_dmc.data import csv_files
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(__file__).parents[2]

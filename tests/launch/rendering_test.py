@@ -13,9 +13,17 @@ import numpy as np
 from absl.testing import absltest
 
 import lfgp_dmc
-from launch import actors, command, playing, strips, training, view
-from launch.clips import Look
-from lfgp_dmc import demonstrations, graphics, task_names
+from lfgp_dmc import graphics, task_names
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import (
+  command,
+  film_strips,
+  policies,
+  task_switch,
+  training,
+  view,
+)
+from lfgp_dmc.pictures.recorder import Look
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
@@ -61,7 +69,7 @@ class PolicyTest(_PolicyTest):
       lfgp_dmc.load_policy(self.policy, "insert")
 
   def test_acts_in_the_viewer_for_the_named_task(self):
-    cast = actors.find(str(self.policy), "")
+    cast = policies.find(str(self.policy), "")
     reach = lfgp_dmc.load_policy(self.policy, "reach")
     seen = []
 
@@ -134,8 +142,8 @@ class RenderingTest(_PolicyTest):
     (row,) = json.loads((self.folder / "s.json").read_text())["rows"]
     self.assertGreater(row["success_at"], 5)
     with self.assertRaisesRegex(command.UserError, "no success of stack in 1"):
-      strips.rows(
-        [actors.find(str(self.policy), "")], 0, Look(32, 32), 2, attempts=1
+      film_strips.rows(
+        [policies.find(str(self.policy), "")], 0, Look(32, 32), 2, attempts=1
       )
 
   def test_a_reset_needs_no_actor(self):
@@ -165,12 +173,14 @@ class RenderingTest(_PolicyTest):
     def switch(*_):
       return lambda step, timestep: "reach" if step < 2 else "close_gripper"
 
-    cast = actors.find(str(self.policy), "")
+    cast = policies.find(str(self.policy), "")
     with (
-      mock.patch("lfgp_dmc.video.label", label),
-      mock.patch.object(playing, "make_switch", switch),
+      mock.patch("lfgp_dmc.pictures.video.label", label),
+      mock.patch.object(task_switch, "make_switch", switch),
     ):
-      clip = strips.play(cast, playing.SCHEDULED, 0, Look(32, 32), max_steps=2)
+      clip = film_strips.play(
+        cast, task_switch.SCHEDULED, 0, Look(32, 32), max_steps=2
+      )
     self.assertEqual(clip.labels, ["reach", "reach", "close_gripper"])
     self.assertEqual(captions[0], ("scheduler: reach", "step 0", False))
     self.assertEqual(captions[2][0], "scheduler: close gripper")

@@ -11,8 +11,8 @@ import time
 
 from absl.testing import absltest
 
-from launch import command, sweep, sweep_jobs
-from lfgp_dmc import csv_files
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.launch import command, sweep, sweep_jobs
 from tests.launch import fixtures
 
 _SCRIPT = pathlib.Path(command.__file__).with_name("sweep.py")

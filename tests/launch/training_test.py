@@ -8,9 +8,11 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from launch import training
-from launch.command import UserError
-from lfgp_dmc import csv_files, evaluation, loop, run_folder
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.launch import training
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.runs import loop, run_folder
 from tests.launch import fixtures
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")

@@ -9,19 +9,15 @@ from unittest import mock
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from agents.policy import Policy
-from launch import configs, datasets, training
-from launch.command import UserError
-from lfgp_dmc import (
-  checkpoints,
-  csv_files,
-  environments,
-  run_folder,
-  task_names,
-  toy,
-)
-from lfgp_dmc.replay import Replay
-from lfgp_dmc.stored_replay import StoredReplay
+from lfgp_dmc import task_names, toy
+from lfgp_dmc.acting import environments
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.data.stored_replay import StoredReplay
+from lfgp_dmc.launch import configs, datasets, training
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.runs import checkpoints, run_folder
 from tests.launch import fixtures
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")

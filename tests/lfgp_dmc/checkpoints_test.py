@@ -6,7 +6,7 @@ from unittest import mock
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import checkpoints, nested
+from lfgp_dmc.runs import checkpoints, pytree
 
 _STATE = {
   "agent": {
@@ -104,7 +104,7 @@ class CheckpointsTest(parameterized.TestCase):
 
   def test_what_cannot_be_stored_is_named(self):
     with self.assertRaisesRegex(TypeError, "'agent/0' is a set"):
-      nested.pack({"agent": [set()]})
+      pytree.pack({"agent": [set()]})
 
 
 if __name__ == "__main__":

@@ -6,9 +6,10 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc import collection, toy
-from lfgp_dmc.collection_attempts import Collector, Plan
-from tasks import experts
+from lfgp_dmc import toy
+from lfgp_dmc.acting import collection
+from lfgp_dmc.acting.attempts import Collector, Plan
+from lfgp_dmc.tasks import experts
 
 
 class _PlayPoint(toy.PointEnvironment):

@@ -5,7 +5,8 @@ import pathlib
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import dataset_table, demonstrations
+from lfgp_dmc import dataset_table
+from lfgp_dmc.data import demonstrations
 from lfgp_dmc.task_names import task_set
 
 

@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import demonstrations
-from lfgp_dmc.demonstrations import DatasetError, Demonstrations
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data.demonstrations import DatasetError, Demonstrations
 
 _ATTRIBUTES = {
   "task": "reach",

@@ -7,8 +7,9 @@ import pathlib
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import environments, evaluation, toy
-from lfgp_dmc.evaluation import EvaluationRow
+from lfgp_dmc import toy
+from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.acting.evaluation import EvaluationRow
 
 _ROWS = [
   EvaluationRow(1000, "right", 0, 7, 1, 4, 2.5),

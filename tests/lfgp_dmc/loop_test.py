@@ -8,11 +8,13 @@ import signal
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import csv_files, loop, toy
-from lfgp_dmc.loop import Progress, TrainSchedule
-from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc import toy
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.remote_acting import RemoteActor
-from lfgp_dmc.replay import Replay
+from lfgp_dmc.runs import loop
+from lfgp_dmc.runs.loop import Progress, TrainSchedule
+from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.types import Period
 
 

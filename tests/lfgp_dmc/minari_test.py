@@ -11,8 +11,8 @@ from unittest import mock
 import numpy as np
 from absl.testing import absltest
 
-from launch import command
-from lfgp_dmc import demonstrations
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import command
 
 if not importlib.util.find_spec("minari"):
   raise unittest.SkipTest("the extra minari is not installed")
@@ -21,7 +21,7 @@ import gymnasium
 import minari
 from minari import data_collector
 
-from lfgp_dmc import minari_datasets
+from lfgp_dmc.data import minari_datasets
 
 _ATTRIBUTES = {
   "task": "reach",

@@ -7,8 +7,10 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import evaluation, figures, video
-from lfgp_dmc.evaluation import EvaluationRow
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.pictures import video
+from lfgp_dmc.study import learning_curve
 
 
 def _frames(count=8, height=47, width=63):
@@ -85,7 +87,7 @@ class FiguresTest(absltest.TestCase):
     paths = [self._csv(0), self._csv(1)]
     for runs, quantity in ((paths[:1], "success"), (paths, "return")):
       output = paths[0].parent / "figures" / f"{quantity}.png"
-      figures.learning_curve(runs, output, "LfGP", quantity)
+      learning_curve.learning_curve(runs, output, "LfGP", quantity)
       picture = imageio.imread(output)
       self.assertGreater(picture.shape[1], 800)
       self.assertGreater(np.ptp(picture[..., :3]), 200)
@@ -94,9 +96,11 @@ class FiguresTest(absltest.TestCase):
     path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
     evaluation.write_csv(path, [])
     with self.assertRaisesRegex(ValueError, "no evaluation rows"):
-      figures.learning_curve([path], path.with_suffix(".png"))
+      learning_curve.learning_curve([path], path.with_suffix(".png"))
     with self.assertRaisesRegex(ValueError, "valid: success, return"):
-      figures.learning_curve([path], path.with_suffix(".png"), "", "regret")
+      learning_curve.learning_curve(
+        [path], path.with_suffix(".png"), "", "regret"
+      )
 
 
 if __name__ == "__main__":

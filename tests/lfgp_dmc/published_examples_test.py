@@ -6,7 +6,8 @@ import shutil
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import demonstrations, published_examples
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.tasks import published_examples
 
 _DATA = pathlib.Path(__file__).parents[1] / "data"
 

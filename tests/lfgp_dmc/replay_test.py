@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.replay import Replay
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
 
 

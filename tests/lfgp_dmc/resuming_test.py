@@ -7,17 +7,12 @@ from unittest import mock
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import (
-  checkpoints,
-  csv_files,
-  evaluation,
-  loop,
-  resuming,
-  run_folder,
-  toy,
-)
-from lfgp_dmc.metrics import MetricsLog
-from lfgp_dmc.replay import Replay
+from lfgp_dmc import toy
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import checkpoints, loop, resuming, run_folder
+from lfgp_dmc.runs.metrics import MetricsLog
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")
 _CONFIG = {"seed": 3}

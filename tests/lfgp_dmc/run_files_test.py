@@ -6,8 +6,9 @@ import pathlib
 from absl.testing import absltest
 from tensorboard.backend.event_processing import event_accumulator
 
-from lfgp_dmc import csv_files, files, run_folder
-from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.data import csv_files, files
+from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.metrics import MetricsLog
 
 
 class _FolderTest(absltest.TestCase):

@@ -5,9 +5,9 @@ import pathlib
 import numpy as np
 from absl.testing import absltest
 
-from lfgp_dmc import files
-from lfgp_dmc.replay import Replay
-from lfgp_dmc.stored_replay import StoredReplay
+from lfgp_dmc.data import files
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.data.stored_replay import StoredReplay
 from lfgp_dmc.types import Transition
 
 

@@ -7,8 +7,10 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import aggregates, csv_files, evaluation, study, study_figures
-from lfgp_dmc.evaluation import EvaluationRow
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.study import aggregates, figures, run_results
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
 
 
@@ -64,22 +66,24 @@ class StudyTest(parameterized.TestCase):
     self.folder = pathlib.Path(self.create_tempdir().full_path)
 
   def _runs(self):
-    return study.read_runs([self.folder])[0]
+    return run_results.read_runs([self.folder])[0]
 
   def test_curves_keep_the_steps_that_all_seeds_have(self):
     write_run(self.folder, "lfgp", "stack", 0, {0: 0, 100: 2, 200: 4})
     write_run(self.folder, "lfgp", "stack", 1, {0: 1, 100: 4})
     runs = self._runs()
-    curve = study.curve(runs, "reach")
+    curve = run_results.curve(runs, "reach")
     np.testing.assert_array_equal(curve.steps, [0, 100])
     np.testing.assert_allclose(curve.scores[:, 0], [[0, 0.5], [0.25, 1]])
-    self.assertIn("seed 0 to 200, seed 1 to 100", study.uneven(runs, "stack"))
-    self.assertIsNone(study.curve(runs, "insert"))
+    self.assertIn(
+      "seed 0 to 200, seed 1 to 100", run_results.uneven(runs, "stack")
+    )
+    self.assertIsNone(run_results.curve(runs, "insert"))
 
   def test_behaviour_cloning_counts_by_its_last_evaluation(self):
     write_run(self.folder, "bc", "stack", 0, {500: 4, 1000: 2})
     write_run(self.folder, "bc", "stack", 1, {700: 1})
-    curve = study.curve(self._runs(), "stack")
+    curve = run_results.curve(self._runs(), "stack")
     np.testing.assert_allclose(curve.scores[:, 0], [[0.5], [0.25]])
 
   @parameterized.parameters(
@@ -90,7 +94,9 @@ class StudyTest(parameterized.TestCase):
     ("lfgp", {"agent": {"transfer_run": "", "transfer_updates": 1000}}),
   )
   def test_the_method_follows_from_the_config(self, method, config):
-    self.assertEqual(study.method_of({"algorithm": "lfgp", **config}), method)
+    self.assertEqual(
+      run_results.method_of({"algorithm": "lfgp", **config}), method
+    )
 
   def test_two_runs_of_one_seed_are_refused(self):
     write_run(self.folder, "lfgp", "stack", 0, {0: 0})
@@ -101,11 +107,11 @@ class StudyTest(parameterized.TestCase):
   def test_a_run_without_evaluation_is_said(self):
     write_run(self.folder, "lfgp", "stack", 0, {0: 0})
     (self.folder / "lfgp_stack_00" / "evaluation.csv").unlink()
-    runs, notes = study.read_runs([self.folder / "lfgp_stack_00"])
+    runs, notes = run_results.read_runs([self.folder / "lfgp_stack_00"])
     self.assertEmpty(runs)
     self.assertRegex(notes[0], "nothing was evaluated yet")
     with self.assertRaisesRegex(ValueError, "no run for the figure 'main'"):
-      study_figures.draw("main", runs, self.folder / "main.png")
+      figures.draw("main", runs, self.folder / "main.png")
 
 
 class StudyFiguresTest(parameterized.TestCase):
@@ -133,14 +139,16 @@ class StudyFiguresTest(parameterized.TestCase):
             {100: seed, 200: 3},
             **config,
           )
-    runs, _ = study.read_runs([self.folder / method for method in methods])
+    runs, _ = run_results.read_runs(
+      [self.folder / method for method in methods]
+    )
     path = self.folder / "figures" / "a.png"
-    notes = study_figures.draw(name, runs, path, kind)
+    notes = figures.draw(name, runs, path, kind)
     picture = imageio.imread(path)
     self.assertGreater(picture.shape[1], 1500)
     self.assertGreater(np.ptp(picture[..., :3]), 200)
     columns, rows = csv_files.read(path.with_suffix(".csv"))
-    self.assertEqual(columns, list(study_figures.COLUMNS))
+    self.assertEqual(columns, list(figures.COLUMNS))
     (last,) = [
       row
       for row in rows
@@ -161,9 +169,9 @@ class StudyFiguresTest(parameterized.TestCase):
   def test_only_cloning_becomes_bars(self):
     for seed in range(3):
       write_run(self.folder, "bc", "stack", seed, {900: seed})
-    runs, _ = study.read_runs([self.folder])
+    runs, _ = run_results.read_runs([self.folder])
     path = self.folder / "bars.pdf"
-    study_figures.draw("main", runs, path)
+    figures.draw("main", runs, path)
     self.assertTrue(path.read_bytes().startswith(b"%PDF"))
     (row,) = csv_files.read(path.with_suffix(".csv"))[1]
     self.assertEqual((row["env_step"], row["middle"]), ("", "0.25"))

@@ -6,9 +6,10 @@ import signal
 
 from absl.testing import absltest
 
-from lfgp_dmc import csv_files, supervised
-from lfgp_dmc.loop import Progress, TrainSchedule
-from lfgp_dmc.metrics import MetricsLog
+from lfgp_dmc.data import csv_files
+from lfgp_dmc.runs import supervised
+from lfgp_dmc.runs.loop import Progress, TrainSchedule
+from lfgp_dmc.runs.metrics import MetricsLog
 
 
 class _Learner:

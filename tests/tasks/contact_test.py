@@ -3,8 +3,8 @@
 import numpy as np
 from absl.testing import absltest, parameterized
 
-import tasks
-from tasks import workspace as ws
+from lfgp_dmc import tasks
+from lfgp_dmc.tasks import workspace as ws
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 _AWAY = np.array([0.13, 0.38, ws.FLAT_Z, *_UPRIGHT])

@@ -5,9 +5,9 @@ import itertools
 import numpy as np
 from absl.testing import absltest, parameterized
 
-import tasks
-from tasks import control
-from tasks import workspace as ws
+from lfgp_dmc import tasks
+from lfgp_dmc.tasks import control
+from lfgp_dmc.tasks import workspace as ws
 
 # Section 9 of the released code's facts: TCP speed after each of the first
 # five 50 ms steps of a constant unit action from rest, m/s.

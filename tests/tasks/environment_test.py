@@ -5,10 +5,10 @@ from absl.testing import absltest, parameterized
 from dm_control import composer
 
 import lfgp_dmc
-import tasks
+from lfgp_dmc import tasks
 from lfgp_dmc.observations import OBSERVATION_SIZE
 from lfgp_dmc.task_names import ALL_TASKS
-from tasks import workspace as ws
+from lfgp_dmc.tasks import workspace as ws
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

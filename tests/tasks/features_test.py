@@ -4,8 +4,8 @@ import numpy as np
 from absl.testing import absltest
 
 import lfgp_dmc
-from tasks import features
-from tasks import workspace as ws
+from lfgp_dmc.tasks import features
+from lfgp_dmc.tasks import workspace as ws
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

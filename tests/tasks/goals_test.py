@@ -5,9 +5,9 @@ import math
 
 from absl.testing import absltest, parameterized
 
-from tasks import workspace as ws
-from tasks.goals import GOALS, terms
-from tasks.snapshot import Snapshot
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.goals import GOALS, terms
+from lfgp_dmc.tasks.snapshot import Snapshot
 
 # Blue flat at the tray's centre, green 10 cm to its left, the hand 5 cm above.
 _REST = Snapshot(

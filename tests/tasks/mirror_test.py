@@ -3,13 +3,13 @@
 import numpy as np
 from absl.testing import absltest, parameterized
 
-import tasks
-from lfgp_dmc import demonstration_faults, flatten, observations
-from lfgp_dmc.demonstrations import Demonstrations
+from lfgp_dmc import flatten, observations, tasks
+from lfgp_dmc.data import demonstration_checks
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.task_names import ALL_TASKS
-from tasks import mirror
-from tasks import workspace as ws
-from tasks.experts import make_expert
+from lfgp_dmc.tasks import mirror
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import make_expert
 
 _STEPS = 100
 # About twice the difference that one step in twenty exceeds, by component: the
@@ -122,7 +122,7 @@ class MirrorTest(parameterized.TestCase):
     np.testing.assert_array_equal(
       found.next_observation[6:], mirror.observation(shown.next_observation)
     )
-    self.assertEmpty(demonstration_faults.of_arrays(found.arrays(), None, None))
+    self.assertEmpty(demonstration_checks.of_arrays(found.arrays(), None, None))
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@ import pickle
 import numpy as np
 from absl.testing import absltest, parameterized
 
-import tasks
-from lfgp_dmc import flatten, seeding
+from lfgp_dmc import flatten, seeding, tasks
 from lfgp_dmc.task_names import ALL_TASKS
-from tasks import workspace as ws
-from tasks.experts import POLICIES, make_expert
-from tasks.experts.view import look
+from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.experts import POLICIES, make_expert
+from lfgp_dmc.tasks.experts.view import look
 
 _STEPS = 360
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0)

@@ -1,0 +1,132 @@
+"""On a GPU: an update recorded once, then replayed as one CUDA graph.
+
+An update is some six hundred small operations; a GPU is done with each sooner
+than Python can ask for the next. A recording asks for all of them at once. It
+works on the memory of its recording, so whatever changes from update to update
+has to be a tensor that is written in place, never a Python number.
+"""
+
+import collections
+from collections.abc import Callable, Hashable
+from typing import NamedTuple, Protocol
+
+import torch
+
+from lfgp_dmc.agents.lfgp.batches import Draw
+
+Metrics = dict[str, torch.Tensor]
+Update = Callable[[], Metrics]
+
+_WARM_UPS = (
+  3  # updates before a recording, in which libraries set themselves up
+)
+
+
+class Recorder(Protocol):
+  """Runs and records updates; `CudaRecorder`, or a test's."""
+
+  def warm_up(self, update: Update, /) -> Metrics:
+    """Makes an update in the way that recording it later asks for."""
+
+  def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
+    """Records an update without making it.
+
+    Returns:
+      Where its metrics will be, and what makes the update.
+    """
+
+
+class CudaRecorder:
+  """Records on the generator's CUDA device."""
+
+  def __init__(self, generator: torch.Generator):
+    """Keeps the one source of random numbers in an update.
+
+    Args:
+      generator: on the device; replays go on with its stream.
+    """
+    self._generator = generator
+    self._stream = torch.cuda.Stream(generator.device)
+
+  def warm_up(self, update: Update, /) -> Metrics:
+    """Makes an update on the stream that it will be recorded on."""
+    current = torch.cuda.current_stream(self._generator.device)
+    self._stream.wait_stream(current)
+    with torch.cuda.stream(self._stream):
+      metrics = update()
+    current.wait_stream(self._stream)
+    return metrics
+
+  def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
+    """Records a CUDA graph."""
+    graph = torch.cuda.CUDAGraph()
+    graph.register_generator_state(self._generator)
+    with torch.cuda.graph(graph, stream=self._stream):
+      metrics = update()
+    return metrics, graph.replay
+
+
+class _Recording(NamedTuple):
+  draw: Draw
+  metrics: Metrics
+  replay: Callable[[], None]
+
+
+class RecordedUpdates:
+  """Makes updates by replaying them, with a recording for each kind."""
+
+  def __init__(self, recorder: Recorder):
+    """Starts without recordings."""
+    self._recorder = recorder
+    self._seen: collections.Counter[Hashable] = collections.Counter()
+    self._recordings: dict[Hashable, _Recording] = {}
+
+  def __call__(
+    self, update: Callable[[Draw], Metrics], draw: Draw, phase: Hashable
+  ) -> Metrics:
+    """Makes one update.
+
+    Args:
+      update: what to make; the same function in every call.
+      draw: its arguments; their numbers are copied.
+      phase: what else decides which operations an update consists of. Each
+        phase, with each set of shapes, has a recording of its own.
+
+    Returns:
+      The metrics; the next call overwrites them.
+    """
+    key = (phase, *(tensor.shape for tensor in _tensors(draw)))
+    recording = self._recordings.get(key)
+    if recording is None and self._seen[key] < _WARM_UPS:
+      self._seen[key] += 1
+      return self._recorder.warm_up(lambda: update(draw))
+    if recording is None:
+      own = _copy(draw)
+      metrics, replay = self._recorder.record(lambda: update(own))
+      recording = self._recordings[key] = _Recording(own, metrics, replay)
+    for target, source in zip(
+      _tensors(recording.draw), _tensors(draw), strict=True
+    ):
+      target.copy_(source, non_blocking=True)
+    recording.replay()
+    return recording.metrics
+
+
+def _tensors(draw: Draw) -> list[torch.Tensor]:
+  """All tensors of a draw, always in the same order."""
+  groups = [group for group in draw if group is not None]
+  parts = [part for group in groups for part in group]
+  return [part for part in parts if isinstance(part, torch.Tensor)]
+
+
+def _copy(draw: Draw) -> Draw:
+  """The same draw in memory of its own."""
+
+  def copied(group):
+    if group is None:
+      return None
+    return type(group)(
+      *(p.clone() if isinstance(p, torch.Tensor) else p for p in group)
+    )
+
+  return Draw(*map(copied, draw))

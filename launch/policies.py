@@ -1,0 +1,119 @@
+"""Who acts: the intentions of a run or a policy folder, or an expert.
+
+Everything here can be pickled into worker processes, and imports the
+simulator or torch only when it is called.
+"""
+
+import dataclasses
+import functools
+import os
+import pathlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+import lfgp_dmc
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.runs import run_folder
+from lfgp_dmc.types import Actor
+
+SCRIPTED = "scripted"
+_ARRAYS = "policy.safetensors"
+
+
+@dataclasses.dataclass(frozen=True)
+class Cast:
+  """An actor to be made, and where it is at home."""
+
+  make: Callable[[], Actor]  # picklable
+  name: str  # for tables and sidecars
+  world: World
+  tasks: tuple[str, ...]  # what it can do, the main task first
+  folder: pathlib.Path | None = None  # of a run
+  config: dict[str, Any] = dataclasses.field(default_factory=dict)
+  env_step: int = 0  # how long it was trained
+
+  @property
+  def main_task(self) -> str:
+    """The task whose environment it is at home in."""
+    return self.world.main_task
+
+
+def scripted_expert(control_hz: int = 20) -> Actor:
+  """Makes the scripted expert of all nine tasks."""
+  from lfgp_dmc.tasks import experts
+
+  return experts.make_expert(control_hz=control_hz)
+
+
+def stored_policy(folder: str) -> Actor:
+  """Reads the policy of a run or policy folder."""
+  import torch
+
+  from lfgp_dmc.agents.policy import Policy
+
+  torch.set_num_threads(1)  # one row at a time: threads only get in the way
+  return Policy.load(folder)
+
+
+def sampling_policy(
+  options: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
+) -> Actor:
+  """The policy of a learner's arrays, that samples its actions."""
+  import torch
+
+  from lfgp_dmc.agents.policy import Policy
+
+  torch.set_num_threads(1)
+  policy = Policy.from_arrays(arrays, options)
+  policy.deterministic = False
+  return policy
+
+
+def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
+  """The actor that `--run` or `--expert` names.
+
+  Args:
+    run: a run or policy folder, or "".
+    expert: "scripted", a run folder, or "".
+    task: for the scripted expert, the task whose environment is loaded.
+    control_hz: likewise, its control steps a second.
+
+  Raises:
+    UserError: none or both are given, or the folder holds no policy.
+  """
+  if bool(run) == bool(expert):
+    raise UserError("give one of --run=FOLDER and --expert=scripted")
+  if expert == SCRIPTED:
+    task = task or lfgp_dmc.MAIN_TASKS[0]
+    tasks = (task, *(t for t in lfgp_dmc.ALL_TASKS if t != task))
+    make = functools.partial(scripted_expert, control_hz)
+    return Cast(make, "scripted expert", World(task, "", control_hz), tasks)
+  return _of_folder(run or expert)
+
+
+def _of_folder(folder: str) -> Cast:
+  path = pathlib.Path(folder)
+  try:
+    config = run_folder.read_config(path)
+    if not (path / _ARRAYS).is_file():
+      raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
+    policy: Any = stored_policy(folder)
+    main_task = config.get("main_task", policy.tasks[0])
+    world = World(
+      main_task, config.get("environment", ""), config.get("control_hz", 20)
+    )
+    world.check()
+  except (ValueError, OSError) as error:
+    raise UserError(str(error)) from None
+  return Cast(
+    functools.partial(stored_policy, os.fspath(path)),
+    path.name,
+    world,
+    (main_task, *(t for t in policy.tasks if t != main_task)),
+    path,
+    config,
+    int(config.get("policy", {}).get("env_step", 0)),
+  )

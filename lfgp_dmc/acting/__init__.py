@@ -1,0 +1,1 @@
+"""Stepping environments: rollouts, collection, evaluation, worker processes."""

@@ -1,0 +1,145 @@
+"""Evaluation: fixed seeded episodes of every intention, one row an episode.
+
+Episode i starts from a reset that depends on (seed, i) alone: not on the task,
+the method, the episodes before it, or how many processes share the work.
+"""
+
+import contextlib
+import functools
+import inspect
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import dm_env
+import tqdm
+from absl import logging
+
+from lfgp_dmc import seeding
+from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import workers as work
+from lfgp_dmc.data.evaluation_csv import (
+  EvaluationRow,
+  append_csv,
+  mean_returns,
+  read_csv,
+  success_rates,
+  success_table,
+  write_csv,
+)
+from lfgp_dmc.types import Actor
+
+__all__ = [
+  "EvaluationRow",
+  "append_csv",
+  "evaluate",
+  "mean_returns",
+  "read_csv",
+  "success_rates",
+  "success_table",
+  "write_csv",
+]
+
+
+def evaluate(
+  make_environment: Callable[..., dm_env.Environment],
+  make_actor: Callable[[], Actor],
+  tasks: Sequence[str],
+  episodes: int,
+  seed: int,
+  workers: int = 1,
+  progress: bool = True,
+  env_step: int = 0,
+) -> list[EvaluationRow]:
+  """Plays `episodes` whole episodes of each task in one environment.
+
+  Args:
+    make_environment: builds the main task's environment, with the observables
+      `reward/<task>` switched on where it has them. One without `reseed` is
+      built anew each episode with `seed=` if the factory takes that.
+    make_actor: builds the actor. With several workers both must be importable:
+      module-level functions, or `functools.partial` of them.
+    tasks: the intentions to evaluate.
+    episodes: episodes a task.
+    seed: the evaluation's own seed.
+    workers: processes; 1 plays in this one.
+    progress: whether to show a progress bar.
+    env_step: goes into the rows.
+
+  Returns:
+    `len(tasks) * episodes` rows, task by task, whatever the workers.
+  """
+  jobs = [(task, i) for task in tasks for i in range(episodes)]
+  workers = max(1, min(workers, len(jobs)))
+  make_player = functools.partial(
+    _Player, make_environment, make_actor, seed, env_step
+  )
+  results = work.ordered(make_player, jobs, workers)
+  bar = tqdm.tqdm(
+    results,
+    total=len(jobs),
+    desc="evaluating",
+    unit="episode",
+    disable=not progress,
+    leave=False,
+  )
+  with contextlib.closing(results):
+    return list(bar)
+
+
+class _Player:
+  """An environment and an actor, built once and used for many episodes."""
+
+  def __init__(self, make_environment, make_actor, seed: int, env_step: int):
+    self._make_environment = make_environment
+    self._seed = seed
+    self._env_step = env_step
+    self._environment = make_environment()
+    self._flatten = environments.flattener(self._environment)
+    self._actor: Actor = make_actor()
+
+  def __call__(self, job: tuple[str, int]) -> EvaluationRow:
+    """Plays one whole episode; success never ends it."""
+    task, episode = job
+    self._prepare(seeding.derive(self._seed, "evaluation", episode))
+    self._actor.begin(task, seeding.derive(self._seed, "actor", task, episode))
+    timestep = self._environment.reset()
+    steps, total, first = 0, 0.0, None
+    while not timestep.last():
+      action = self._actor.act(self._flatten(timestep.observation))
+      timestep = self._environment.step(action)
+      steps += 1
+      total += float(environments.task_rewards(timestep, (task,))[0])
+      if first is None and environments.has_succeeded(timestep, task):
+        first = steps
+    success: int | None = int(first is not None)
+    if environments.has_succeeded(timestep, task) is None:
+      success = None
+    if environments.is_physics_failure(timestep):
+      logging.warning(
+        "physics failed in episode %d of %s at step %d: counted as a failure",
+        episode,
+        task,
+        steps,
+      )
+      success, first = 0, None
+    return EvaluationRow(
+      self._env_step, task, episode, self._seed, success, first, total
+    )
+
+  def close(self) -> None:
+    """Frees the environment."""
+    self._environment.close()
+
+  def _prepare(self, seed: int) -> None:
+    if hasattr(self._environment, "reseed"):
+      self._environment.reseed(seed)
+    elif _takes_seed(self._make_environment):
+      self._environment.close()
+      self._environment = self._make_environment(seed=seed)
+
+
+def _takes_seed(factory: Callable[..., Any]) -> bool:
+  try:
+    return "seed" in inspect.signature(factory).parameters
+  except (TypeError, ValueError):  # a builtin without a signature
+    return False

@@ -1,0 +1,70 @@
+"""The CSV files of a run: read, append, and cut back to a checkpoint."""
+
+import csv
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from lfgp_dmc.data import files
+
+STEP_COLUMN = "env_step"
+
+
+def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
+  """Reads a CSV file with a header; a torn last line is left out.
+
+  Returns:
+    The columns, and the rows as text; both empty if the file is empty.
+  """
+  with open(path, newline="", encoding="utf-8") as file:
+    text = file.read()
+  # A process killed while writing leaves a last line without its end.
+  whole = text[: text.rfind("\n") + 1]
+  reader = csv.DictReader(whole.splitlines())
+  columns = list(reader.fieldnames or ())
+  return columns, [row for row in reader if None not in row.values()]
+
+
+def write(
+  path: files.Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]
+) -> None:
+  """Writes a whole file, or nothing."""
+  with (
+    files.replacing(path) as aside,
+    open(aside, "w", newline="", encoding="utf-8") as file,
+  ):
+    writer = csv.DictWriter(file, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+
+
+def append(
+  path: files.Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]
+) -> None:
+  """Appends rows to a file of the same columns; makes it if it is missing.
+
+  Raises:
+    ValueError: the file has other columns.
+  """
+  path = pathlib.Path(path)
+  if not path.exists() or not path.stat().st_size:
+    write(path, columns, rows)
+    return
+  found, _ = read(path)
+  if found != list(columns):
+    raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
+  with open(path, "a", newline="", encoding="utf-8") as file:
+    csv.DictWriter(file, columns, lineterminator="\n").writerows(rows)
+
+
+def truncate_after(path: files.Path, env_step: int) -> None:
+  """Drops the rows later than `env_step`; nothing if there is no file."""
+  path = pathlib.Path(path)
+  if not path.exists():
+    return
+  columns, rows = read(path)
+  if not columns:
+    path.unlink()
+    return
+  kept = [row for row in rows if int(row[STEP_COLUMN]) <= env_step]
+  write(path, columns, kept)

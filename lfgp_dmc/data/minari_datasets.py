@@ -1,0 +1,137 @@
+"""Demonstrations to and from Minari; needs the extra `minari`.
+
+Minari keeps whole trajectories: T + 1 observations of T actions, rewards and
+ends. A demonstration has no rewards, so they are 0 there; one that ends in
+success is `terminated` at its last step, every other `truncated`. The way back
+reads both as that, and takes anybody's dataset of flat float observations.
+Datasets lie where Minari keeps them (`MINARI_DATASETS_PATH`).
+"""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import minari
+import numpy as np
+from minari.data_collector import EpisodeBuffer
+
+from lfgp_dmc.data.demonstrations import Demonstrations
+
+_KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
+
+
+def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
+  """Stores one task's demonstrations as a local Minari dataset.
+
+  Args:
+    data: of one task, with its attributes.
+    dataset_id: Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
+
+  Returns:
+    The dataset.
+
+  Raises:
+    ValueError: the id is taken or no id, or an episode's rows do not follow
+      from one another.
+  """
+  if dataset_id in minari.list_local_datasets():
+    raise ValueError(f"the Minari dataset {dataset_id} exists; choose another")
+  gaps = (data.episode[1:] == data.episode[:-1]) & np.any(
+    data.observation[1:] != data.next_observation[:-1], axis=1
+  )
+  if gaps.any():
+    raise ValueError(
+      f"row {int(np.argmax(gaps)) + 1} does not start where the row before "
+      "ended; Minari keeps whole trajectories"
+    )
+  dataset = minari.create_dataset_from_buffers(
+    dataset_id,
+    [_buffer(data, rows) for rows in _episodes(data)],
+    observation_space=_box(np.inf, data.observation.shape[1]),
+    action_space=_box(1.0, data.action.shape[1]),
+    algorithm_name=str(data.attributes.get("expert", "unknown")),
+    description="Demonstrations of LfGP-DMC.",
+  )
+  dataset.storage.update_metadata({_KEY: json.dumps(dict(data.attributes))})
+  return dataset
+
+
+def from_minari(
+  dataset_id: str, attributes: Mapping[str, Any] | None = None
+) -> Demonstrations:
+  """Reads a local Minari dataset; `demonstrations.write` makes it ours.
+
+  Args:
+    dataset_id: Minari's name.
+    attributes: `task`, `main_task`, `collection`, `expert`, `seed` and
+      `control_hz`, over those that `to_minari` stored.
+
+  Returns:
+    Its pairs; episodes are numbered from 0.
+
+  Raises:
+    ValueError: there is no such dataset, or its observations or actions are
+      not flat floats.
+  """
+  if dataset_id not in minari.list_local_datasets():
+    raise ValueError(
+      f"no local Minari dataset {dataset_id}; download it with: minari "
+      f"download {dataset_id}"
+    )
+  dataset = minari.load_dataset(dataset_id)
+  for name in ("observation_space", "action_space"):
+    space = getattr(dataset.spec, name)
+    if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
+      raise ValueError(f"{dataset_id}: {name} is {space}; valid: a flat Box")
+  episodes = [one for one in dataset.iterate_episodes() if len(one.actions)]
+  if not episodes:
+    raise ValueError(f"{dataset_id} holds no step")
+  stored = dict(dataset.storage.metadata).get(_KEY, "{}")
+  observation, action, after = (
+    np.concatenate(parts).astype(np.float32)
+    for parts in zip(*map(_pairs, episodes), strict=True)
+  )
+  lengths = [len(one.actions) for one in episodes]
+  return Demonstrations(
+    observation,
+    action,
+    after,
+    episode=np.repeat(np.arange(len(episodes), dtype=np.int32), lengths),
+    is_last=np.concatenate([_success(one) for one in episodes]),
+    attributes={**json.loads(str(stored)), **(attributes or {})},
+  )
+
+
+def _episodes(data: Demonstrations) -> list[slice]:
+  starts = np.flatnonzero(np.diff(data.episode, prepend=data.episode[0] - 1))
+  ends = [*starts[1:], len(data)]
+  return [slice(a, b) for a, b in zip(starts, ends, strict=True)]
+
+
+def _buffer(data: Demonstrations, rows: slice) -> EpisodeBuffer:
+  terminations = data.is_last[rows]
+  truncations = np.zeros_like(terminations)
+  truncations[-1] = not terminations[-1]
+  last = data.next_observation[rows][-1:]
+  return EpisodeBuffer(
+    observations=np.concatenate([data.observation[rows], last]),
+    actions=data.action[rows],
+    rewards=np.zeros(len(terminations), np.float32),
+    terminations=terminations,
+    truncations=truncations,
+  )
+
+
+def _pairs(episode) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+  return episode.observations[:-1], episode.actions, episode.observations[1:]
+
+
+def _success(episode) -> np.ndarray:
+  is_last = np.zeros(len(episode.actions), bool)
+  is_last[-1] = bool(episode.terminations[-1])
+  return is_last
+
+
+def _box(bound: float, size: int) -> gymnasium.spaces.Box:
+  return gymnasium.spaces.Box(-bound, bound, (size,), np.float32)

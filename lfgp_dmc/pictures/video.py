@@ -1,0 +1,151 @@
+"""Clips, pictures and film strips from frames, each with a JSON sidecar."""
+
+import pathlib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import imageio.v2 as imageio
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from lfgp_dmc.data import files
+
+FORMATS = (".mp4", ".gif", ".png")
+
+
+def write(
+  path: files.Path,
+  frames: Sequence[np.ndarray],
+  fps: float = 20.0,
+  metadata: Mapping[str, Any] | None = None,
+) -> pathlib.Path:
+  """Writes frames and, beside them, `NAME.json`.
+
+  Args:
+    path: `.mp4`, `.gif`, or `.png` (all frames side by side: a film strip).
+    frames: at least one, uint8 [height, width, 3], all of one size.
+    fps: frames a second.
+    metadata: what the clip shows; goes into the sidecar with its size.
+
+  Returns:
+    The path written.
+
+  Raises:
+    ValueError: an unknown suffix, no frames, or frames of another kind.
+  """
+  path = pathlib.Path(path)
+  suffix = path.suffix.lower()
+  if suffix not in FORMATS:
+    raise ValueError(f"{path}: unknown format; valid: {', '.join(FORMATS)}")
+  frames = _checked(frames)
+  path.parent.mkdir(parents=True, exist_ok=True)
+  with files.replacing(path) as aside:
+    if suffix == ".png":
+      imageio.imwrite(aside, np.concatenate(frames, axis=1))
+    elif suffix == ".gif":
+      imageio.mimwrite(aside, frames, duration=1000 / fps, loop=0)
+    else:
+      # yuv420p halves the colours' resolution: sides must be even.
+      even = [_padded_to_even(frame) for frame in frames]
+      imageio.mimwrite(aside, even, fps=fps, quality=8, macro_block_size=2)
+  height, width = frames[0].shape[:2]
+  files.write_json(
+    path.with_suffix(".json"),
+    {
+      "file": path.name,
+      "frames": len(frames),
+      "fps": fps,
+      "width": width,
+      "height": height,
+      **(metadata or {}),
+    },
+  )
+  return path
+
+
+def film_strip(frames: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
+  """Picks `count` frames, evenly spaced from the first to the last."""
+  picked = np.linspace(0, len(frames) - 1, min(count, len(frames)))
+  return [frames[round(i)] for i in picked]
+
+
+def grid(
+  clips: Sequence[Sequence[np.ndarray]], columns: int
+) -> list[np.ndarray]:
+  """Plays clips side by side; the shorter ones hold their last frame.
+
+  Args:
+    clips: frames uint8 [height, width, 3], all of one size; at least one each.
+    columns: clips in a row; the last row is filled up with white.
+
+  Returns:
+    Frames uint8 [rows * height, columns * width, 3], as many as the longest
+    clip has.
+  """
+  blank = np.full_like(clips[0][0], 255)
+  rows = -(-len(clips) // columns)
+  frames = []
+  for i in range(max(map(len, clips))):
+    now = [clip[min(i, len(clip) - 1)] for clip in clips]
+    now += [blank] * (rows * columns - len(now))
+    frames.append(
+      np.concatenate(
+        [
+          np.concatenate(now[row * columns : (row + 1) * columns], axis=1)
+          for row in range(rows)
+        ]
+      )
+    )
+  return frames
+
+
+def label(
+  frame: np.ndarray, left: str, right: str = "", highlight: bool = False
+) -> np.ndarray:
+  """Draws a caption on a dark strip along the top of a frame.
+
+  Args:
+    frame: uint8 [height, width, 3]; left unchanged.
+    left: such as the intention's name.
+    right: such as the step and the success.
+    highlight: green strip instead of a dark one, such as after success.
+
+  Returns:
+    uint8 [height, width, 3].
+  """
+  image = Image.fromarray(frame)
+  size = max(10, frame.shape[0] // 20)
+  font = ImageFont.load_default(size)
+  margin = size // 2
+  draw = ImageDraw.Draw(image, "RGBA")
+  strip = (20, 110, 50, 190) if highlight else (0, 0, 0, 140)
+  draw.rectangle((0, 0, image.width, size + 2 * margin), fill=strip)
+  middle = margin + size / 2
+  white = (255, 255, 255, 255)
+  draw.text((margin, middle), left, white, font, anchor="lm")
+  if right:
+    draw.text((image.width - margin, middle), right, white, font, anchor="rm")
+  return np.asarray(image)
+
+
+def _checked(frames: Sequence[np.ndarray]) -> list[Any]:
+  frames = [np.asarray(frame) for frame in frames]
+  if not frames:
+    raise ValueError("no frames to write")
+  for frame in frames:
+    shape = frame.shape
+    if frame.dtype != np.uint8 or len(shape) != 3 or shape[2] != 3:
+      raise ValueError(
+        f"a frame is {frame.dtype} {list(shape)}; valid: uint8 "
+        "[height, width, 3]"
+      )
+    if shape != frames[0].shape:
+      raise ValueError(
+        f"frames of two sizes: {list(frames[0].shape)} and {list(shape)}"
+      )
+  return frames
+
+
+def _padded_to_even(frame: np.ndarray) -> Any:
+  height, width = frame.shape[:2]
+  return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

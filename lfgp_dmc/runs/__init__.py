@@ -1,0 +1,1 @@
+"""A run: its loop, folder, checkpoints and logs."""

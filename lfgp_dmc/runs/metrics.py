@@ -1,0 +1,92 @@
+"""The metrics of one run: `metrics.csv` with TensorBoard events beside it."""
+
+import csv
+import pathlib
+import time
+from collections.abc import Mapping
+
+from tensorboard.compat.proto import event_pb2, summary_pb2
+from tensorboard.summary.writer import event_file_writer
+
+from lfgp_dmc.data import csv_files, files
+
+CSV_NAME = "metrics.csv"
+_EVENTS_FOLDER = "tensorboard"
+
+
+class MetricsLog:
+  """Appends rows whose columns are fixed by the first one."""
+
+  def __init__(self, folder: files.Path):
+    """Opens the log of a run folder, and continues one that exists.
+
+    Args:
+      folder: the run folder; `metrics.csv` and `tensorboard/` go into it.
+    """
+    self._path = pathlib.Path(folder) / CSV_NAME
+    self._columns: list[str] = []
+    if self._path.exists():
+      self._columns, _ = csv_files.read(self._path)
+    self._events = event_file_writer.EventFileWriter(
+      str(self._path.parent / _EVENTS_FOLDER)
+    )
+
+  @property
+  def columns(self) -> tuple[str, ...]:
+    """The columns, in order; empty before the first row."""
+    return tuple(self._columns)
+
+  def write(self, row: Mapping[str, float]) -> None:
+    """Appends one row and flushes it.
+
+    Args:
+      row: `env_step` and the metrics by name; a missing one is left empty.
+
+    Raises:
+      ValueError: a column that the first row did not have; names them.
+    """
+    if csv_files.STEP_COLUMN not in row:
+      raise ValueError(f"a metrics row needs {csv_files.STEP_COLUMN!r}")
+    if not self._columns:
+      self._columns = list(row)
+      csv_files.write(self._path, self._columns, [])
+    unknown = [name for name in row if name not in self._columns]
+    if unknown:
+      raise ValueError(
+        f"{self._path}: columns {unknown} were not in the first row, which "
+        "fixes them"
+      )
+    with open(self._path, "a", newline="", encoding="utf-8") as file:
+      writer = csv.DictWriter(file, self._columns, lineterminator="\n")
+      writer.writerow(row)
+    self.write_scalars(int(row[csv_files.STEP_COLUMN]), row)
+
+  def write_scalars(self, env_step: int, values: Mapping[str, float]) -> None:
+    """Sends values to TensorBoard alone (evaluation has its own CSV)."""
+    summary = summary_pb2.Summary(
+      value=[
+        summary_pb2.Summary.Value(tag=name, simple_value=float(value))
+        for name, value in values.items()
+        if name != csv_files.STEP_COLUMN
+      ]
+    )
+    self._events.add_event(
+      event_pb2.Event(wall_time=time.time(), step=env_step, summary=summary)
+    )
+    self._events.flush()
+
+  def truncate_after(self, env_step: int) -> None:
+    """Drops what was logged after `env_step`, where a resumed run goes on."""
+    csv_files.truncate_after(self._path, env_step)
+    # TensorBoard hides older events from the step of a START event on.
+    start = event_pb2.SessionLog(status=event_pb2.SessionLog.START)
+    self._events.add_event(
+      event_pb2.Event(
+        wall_time=time.time(), step=env_step + 1, session_log=start
+      )
+    )
+    self._events.flush()
+
+  def close(self) -> None:
+    """Closes the TensorBoard file; the CSV is never left open."""
+    self._events.close()

@@ -1,0 +1,182 @@
+"""A run's folder: `config.json`, CSVs, `checkpoints/`, `replay/`.
+
+A folder belongs to one process at a time: it holds a lock on `run.lock`, which
+the system releases however the process ends.
+"""
+
+import dataclasses
+import datetime
+import fcntl
+import json
+import pathlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from lfgp_dmc.data import files
+
+CONFIG_NAME = "config.json"
+# What the run itself adds to the config that it was started with: the policy's
+# widths and tasks, so that a run's folder is a policy folder too.
+ADDED_FIELDS = ("policy",)
+
+
+class RunFolderError(ValueError):
+  """A run folder that cannot be used as asked; the message says why."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RunFolder:
+  """The places in one run's folder."""
+
+  path: pathlib.Path
+  _lock: Any = dataclasses.field(repr=False, compare=False, default=None)
+
+  @property
+  def config(self) -> pathlib.Path:
+    """The resolved config, JSON."""
+    return self.path / CONFIG_NAME
+
+  @property
+  def evaluation(self) -> pathlib.Path:
+    """A row an evaluation episode, CSV."""
+    return self.path / "evaluation.csv"
+
+  @property
+  def metrics(self) -> pathlib.Path:
+    """A row a log interval, CSV."""
+    return self.path / "metrics.csv"
+
+  @property
+  def checkpoints(self) -> pathlib.Path:
+    """The folder of checkpoints."""
+    return self.path / "checkpoints"
+
+  @property
+  def replay(self) -> pathlib.Path:
+    """The folder of the mapped replay."""
+    return self.path / "replay"
+
+
+def default_path(
+  algorithm: str,
+  task: str,
+  parent: files.Path = "runs",
+  now: datetime.datetime | None = None,
+) -> pathlib.Path:
+  """`runs/20220131_235959_lfgp_stack`, or with `_2`, ... if that exists."""
+  now = datetime.datetime.now() if now is None else now
+  stem = f"{now:%Y%m%d_%H%M%S}_{algorithm}_{task}"
+  path, number = pathlib.Path(parent) / stem, 1
+  while path.exists():
+    number += 1
+    path = pathlib.Path(parent) / f"{stem}_{number}"
+  return path
+
+
+def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
+  """Makes a new run's folder, writes its config, and locks it.
+
+  Args:
+    path: the folder to make; its parents are made too.
+    config: the resolved config, JSON-able.
+
+  Raises:
+    RunFolderError: the folder exists.
+    OSError: it cannot be made or written.
+  """
+  path = pathlib.Path(path)
+  try:
+    path.mkdir(parents=True)
+  except FileExistsError:
+    raise RunFolderError(
+      f"{path} exists; continue it with --resume, or choose another --run"
+    ) from None
+  run = RunFolder(path, _locked(path))
+  files.write_json(run.config, config)
+  return run
+
+
+def resume(
+  path: files.Path,
+  config: Mapping[str, Any],
+  complete: Callable[[dict[str, Any]], dict[str, Any]] = dict,
+) -> RunFolder:
+  """Opens an existing run's folder and locks it.
+
+  Args:
+    path: the run's folder.
+    config: the resolved config of the command; it must equal the run's own.
+    complete: gives a stored config the fields that are newer than the run.
+
+  Raises:
+    RunFolderError: there is no such run, its config differs (the message names
+      the fields), or another process is running it.
+  """
+  path = pathlib.Path(path)
+  known = read_config(path)
+  known = complete({k: v for k, v in known.items() if k not in ADDED_FIELDS})
+  asked = {k: v for k, v in config.items() if k not in ADDED_FIELDS}
+  fields = differing_fields(known, asked)
+  if fields:
+    raise RunFolderError(
+      f"{path} was started with another config; --resume keeps it. Differing: "
+      + "; ".join(fields)
+    )
+  return RunFolder(path, _locked(path))
+
+
+def read_config(path: files.Path) -> dict[str, Any]:
+  """The config that a run or policy folder was written with.
+
+  Raises:
+    RunFolderError: the folder or its config is missing or damaged.
+  """
+  path = pathlib.Path(path)
+  if not path.is_dir():
+    raise RunFolderError(f"no run folder {path}")
+  if not (path / CONFIG_NAME).is_file():
+    raise RunFolderError(f"{path} is not a run: it has no {CONFIG_NAME}")
+  try:
+    config = files.read_json(path / CONFIG_NAME)
+  except ValueError as error:
+    raise RunFolderError(str(error)) from None
+  if not isinstance(config, dict):
+    raise RunFolderError(f"{path / CONFIG_NAME} holds no config")
+  return config
+
+
+def differing_fields(
+  known: Mapping[str, Any], asked: Mapping[str, Any]
+) -> list[str]:
+  """What differs between two configs: `agent.xi (45, now 90)`, ..."""
+  first, second = _leaves(known), _leaves(asked)
+  names = [*first, *(name for name in second if name not in first)]
+  return [
+    f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
+    for name in names
+    if first.get(name) != second.get(name)
+  ]
+
+
+def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+  """Dotted name -> the value as JSON, so that tuples equal lists."""
+  leaves = {}
+  for name, value in config.items():
+    if isinstance(value, Mapping) and value:
+      leaves.update(_leaves(value, f"{prefix}{name}."))
+    else:
+      leaves[f"{prefix}{name}"] = json.dumps(value)
+  return leaves
+
+
+def _locked(path: pathlib.Path):
+  """An open file whose lock keeps other processes off the folder."""
+  file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
+  try:
+    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+  except BlockingIOError:
+    file.close()
+    raise RunFolderError(
+      f"another process is running {path}; wait for it or stop it"
+    ) from None
+  return file
