@@ -108,7 +108,7 @@ class RayEngine:
     except (ConnectionError, ValueError, RuntimeError) as error:
       raise UserError(f"--ray_address={address}: {error}") from None
     self._ray, self._slots = ray, slots
-    self._make_run = ray.remote(num_cpus=1)(_RayRun)
+    self._make_run: Any = ray.remote(num_cpus=1)(_RayRun)
     self._running: dict[str, tuple[Any, Any]] = {}  # actor, exit status to be
 
   @property
@@ -182,7 +182,9 @@ def popen(
   """
   log.parent.mkdir(parents=True, exist_ok=True)
   with open(log, "a", encoding="utf-8") as output:
-    output.write(f"$ train.py {' '.join(arguments)}  # on {place}\n")
+    # A killed attempt leaves the log within a line.
+    lead = "\n" if output.tell() else ""
+    output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
     output.flush()
     return subprocess.Popen(
       [
