@@ -124,13 +124,10 @@ class RayEngine:
 
   def ended(self) -> Mapping[str, int]:
     """See `Engine`; a run that is lost with its node counts as killed."""
-    if not self._running:
-      return {}
-    names = {status: name for name, (_, status) in self._running.items()}
-    ready, _ = self._ray.wait(list(names), num_returns=len(names), timeout=0)
     over = {}
-    for status in ready:
-      name = names[status]
+    for name, (_, status) in list(self._running.items()):
+      if not self._ray.wait([status], timeout=0)[0]:
+        continue
       del self._running[name]
       try:
         over[name] = self._ray.get(status)
