@@ -29,7 +29,7 @@ from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.launch.environment_spec import World
 from lfgp_dmc.pictures import recorder, video
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.study import learning_curve
+from lfgp_dmc.study import figures, run_results
 from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
@@ -71,11 +71,8 @@ def main() -> int:
     **({"stored": _evaluate_stored(config, stored)} if stored else {}),
     "expert": _evaluate_expert(config),
   }
-  figure = learning_curve.learning_curve(
-    [path / "evaluation.csv"],
-    path / "learning_curve.png",
-    f"{config.algorithm} on {config.main_task}".replace("_", " "),
-  )
+  figure = path / "learning_curve.png"
+  figures.learning_curve(run_results.read_runs([path])[0], figure)
   clip = _film(config, path, columns, stored)
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
