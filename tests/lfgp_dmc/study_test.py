@@ -69,7 +69,7 @@ class StudyTest(parameterized.TestCase):
       for task in task_set(main_task)
       for i in range(4)
     ]
-    evaluation_csv.write_csv(path / "evaluation.csv", rows)
+    evaluation_csv.append_csv(path / "evaluation.csv", rows)
 
   def _read(self):
     return run_results.read_runs([self.folder])[0]
