@@ -16,17 +16,7 @@ SCHEDULED = "scheduled"
 
 
 class Stage:
-  """A cast in its environment; each clip depends on its seed alone.
-
-  Args:
-    cast: the policy.
-    task: an intention, or `SCHEDULED`.
-    look: how frames are made.
-    is_play: whether the expert goes from task to task.
-
-  Raises:
-    UserError: there can be no picture here, or of this environment.
-  """
+  """A cast in its environment; each clip depends on its seed alone."""
 
   def __init__(
     self,
@@ -35,55 +25,55 @@ class Stage:
     look: recorder.Look,
     is_play: bool = False,
   ):
-    self._cast, self._task, self._is_play = cast, task, is_play
-    self._look = look
-    if task == SCHEDULED:
-      self._look = dataclasses.replace(look, scheduled_for=cast.main_task)
+    """Builds the environment.
+
+    Args:
+      cast: the policy.
+      task: an intention, or `SCHEDULED`.
+      look: how frames are made.
+      is_play: whether the expert goes from task to task.
+
+    Raises:
+      UserError: no pictures can be made here, or of this environment.
+    """
     if fault := graphics.fault():
       raise command.UserError(fault)
-    self._environment: Any = cast.world.build()
+    if task == SCHEDULED:
+      look = dataclasses.replace(look, scheduled_for=cast.main_task)
+    self._cast, self._task, self._is_play = cast, task, is_play
+    self._look, self._environment = look, cast.world.build()
     with command.checked_input():
       recorder.prepare(self._environment, look)
 
-  def play(
-    self, seed: int, every: int | None = None, **limits: Any
-  ) -> recorder.Clip:
+  def play(self, seed: int, every: int = 0, **limits: Any) -> recorder.Clip:
     """Records one episode.
 
     Args:
       seed: of the reset, the policy and the choice of tasks.
-      every: 50 ms a frame, if not the look's own.
+      every: 50 ms a frame; 0: no frames.
       **limits: see `recorder.record`.
 
     Raises:
       UserError: there is no scheduler to choose by.
     """
+    environment: Any = self._environment
     derived = seeding.derive(seed, "clip")
-    if hasattr(self._environment, "reseed"):
-      self._environment.reseed(derived)
+    if hasattr(environment, "reseed"):
+      environment.reseed(derived)
     else:
-      self._environment.close()
-      self._environment = self._cast.world.build(seed=derived)
-    look = self._look
-    if every is not None:
-      look = dataclasses.replace(look, every=every)
-    return recorder.record(
-      self._environment,
-      self._cast.make(),
-      self._environment.reset(),
-      self._switch(seed),
-      seed,
-      look,
-      **limits,
-    )
-
-  def _switch(self, seed: int) -> recorder.Switch:
+      environment.close()
+      self._environment = environment = self._cast.world.build(seed=derived)
+    switch = task_switch.one_task(self._task)
     if self._is_play:
       tasks = lfgp_dmc.task_set(self._cast.main_task)
-      return task_switch.Play(self._environment, tasks, seed)
-    if self._task == SCHEDULED:
-      return scheduled(self._cast, seed)
-    return lambda step, timestep: self._task
+      switch = task_switch.Play(environment, tasks, seed)
+    elif self._task == SCHEDULED:
+      switch = scheduled(self._cast, seed)
+    look = dataclasses.replace(self._look, every=every)
+    first, actor = environment.reset(), self._cast.make()
+    return recorder.record(
+      environment, actor, first, switch, seed, look, **limits
+    )
 
 
 def scheduled(cast: policies.Cast, seed: int) -> recorder.Switch:

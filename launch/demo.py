@@ -17,7 +17,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import dm_env
 import numpy as np
 from absl import flags
 
@@ -27,7 +26,7 @@ from lfgp_dmc.acting.evaluation import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.launch.environment_spec import World
-from lfgp_dmc.pictures import recorder, video
+from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import figures, run_results
 from lfgp_dmc.types import Actor
@@ -216,7 +215,7 @@ def _play(
       environment,
       actor,
       environment.reset(),
-      functools.partial(_one_task, row.task),
+      task_switch.one_task(row.task),
       seed,
       recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_SECONDS * world.control_hz,
@@ -241,10 +240,6 @@ def choose_episodes(
     return row.task != main_task, not row.success, "gripper" in row.task
 
   return sorted(best.values(), key=rank)[:_CLIPS]
-
-
-def _one_task(task: str, step: int, timestep: dm_env.TimeStep) -> str:
-  return task
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ _RUNS = flags.DEFINE_list(
 )
 _OUTPUT = flags.DEFINE_string("output", "results", "Folder for the figures.")
 _FIGURE = flags.DEFINE_enum(
-  "figure", _EACH, [_EACH, *figures.PLANS], "Which figure; see above."
+  "figure", _EACH, [_EACH, *figures.FIGURES], "Which figure; see above."
 )
 _QUANTITY = flags.DEFINE_enum(
   "quantity", run_results.SUCCESS, run_results.QUANTITIES, "What is drawn."

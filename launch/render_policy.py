@@ -109,9 +109,11 @@ def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
   output = _output(f"{cast.name}_{'play' if is_play else task}")
   stage = clips.Stage(cast, task, look, is_play)
   goal = cast.main_task if task == clips.SCHEDULED else task
-  limits = {"max_steps": _STEPS.value or None,
-            "until_success_of": goal if _UNTIL.value else None}  # fmt: skip
-  played = [stage.play(seed, **limits) for seed in seeds]
+  steps, until = _STEPS.value or None, goal if _UNTIL.value else None
+  played = [
+    stage.play(seed, look.every, max_steps=steps, until_success_of=until)
+    for seed in seeds
+  ]
   shown = [
     {
       "seed": seed,
@@ -172,7 +174,7 @@ def _picture_of_resets(look: recorder.Look, seeds, columns: int) -> None:
   task = _TASK.value or lfgp_dmc.MAIN_TASKS[0]
   output = _output(f"reset_{task}", (".png",))
   stage = clips.Stage(policies.find("", policies.SCRIPTED, task), task, look)
-  pictures = [stage.play(seed, max_steps=0).frames for seed in seeds]
+  pictures = [stage.play(seed, every=1, max_steps=0).frames for seed in seeds]
   metadata = {"task": task, "seed": seeds[0], "camera": look.camera}
   video.write(output, video.grid(pictures, columns), metadata=metadata)
   print(output)

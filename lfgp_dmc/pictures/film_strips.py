@@ -14,8 +14,8 @@ def row(
   """Searches for a success and shows it, evenly from the reset on.
 
   Args:
-    play: a function of `seed`, `every` (see `Look`), `max_steps` and
-      `until_success_of`.
+    play: a function of `seed`, `every` (see `Look`; default 0), `max_steps`
+      and `until_success_of`.
     task: the task to succeed in.
     seeds: of the episodes to try, in this order.
     columns: frames in the row.
@@ -28,7 +28,7 @@ def row(
     ValueError: no episode succeeded.
   """
   for seed in seeds:
-    clip = play(seed, every=0, until_success_of=task)
+    clip = play(seed, until_success_of=task)
     if task in clip.first_success:
       break
     logging.info("no success of %s with seed %d", task, seed)

@@ -1,4 +1,4 @@
-"""Which task acts when: play from one task to the next."""
+"""Which task acts when: one alone, or play from one to the next."""
 
 import itertools
 from collections.abc import Sequence
@@ -8,15 +8,21 @@ import dm_env
 
 from lfgp_dmc import seeding
 from lfgp_dmc.acting import environments
+from lfgp_dmc.pictures.recorder import Switch
 
 _PLAY_PATIENCE = 120  # control steps an attempt
+
+
+def one_task(task: str) -> Switch:
+  """The same task at every step."""
+  return lambda step, timestep: task
 
 
 class Play:
   """Another random task after each success, without a reset, or in time."""
 
   def __init__(self, environment: Any, tasks: Sequence[str], seed: int):
-    """Initialises the switch.
+    """Chooses the first task.
 
     Args:
       environment: has `clear_success`.

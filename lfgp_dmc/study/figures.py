@@ -3,7 +3,7 @@
 import itertools
 import pathlib
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any
 
 import matplotlib.figure
 
@@ -41,19 +41,13 @@ COLUMNS = ("main_task", "task", "method", "env_step", "runs", "estimate",
            "middle", "low", "high")  # fmt: skip
 
 
-class Plan(NamedTuple):
-  """What a figure shows: the main tasks, or a row of all tasks for each."""
-
-  styles: Mapping[str, Style]  # method -> its look, in the legend's order
-  shows_all_tasks: bool = False
-
-
-# After each, the paper's labels: of its success and of its return.
-PLANS = {
-  "main": Plan(_MULTITASK | _SINGLE_TASK),  # perf_results, main_return
-  "multitask": Plan(_MULTITASK, True),  # multi_perf_results, multitask_return
-  "transfer": Plan(_TRANSFER),  # left of transfer_and_play_{results,return}
-  "play": Plan(_PLAY),  # and right
+# Methods of each figure, in the legend's order; after it, the paper's labels of
+# success and return.
+FIGURES = {
+  "main": _MULTITASK | _SINGLE_TASK,  # perf_results, main_return
+  "multitask": _MULTITASK,  # multi_perf_results, multitask_return
+  "transfer": _TRANSFER,  # left of transfer_and_play_{results,return}
+  "play": _PLAY,  # and right
 }
 
 
@@ -67,8 +61,10 @@ def draw(
   """Draws one of the paper's figures, and writes its numbers beside it.
 
   Args:
-    name: a key of `PLANS`.
-    runs: of the study; those of other methods are left out.
+    name: a key of `FIGURES`; "multitask" has a row of all tasks for each main
+      task, the others show main tasks alone.
+    runs: of the study, as `read_runs` sorts them; those of other methods are
+      left out.
     output: the picture; its suffix chooses the format. The numbers go to the
       same name with `.csv`.
     quantity: "success" or "return".
@@ -80,46 +76,35 @@ def draw(
   Raises:
     ValueError: there is no run to draw.
   """
-  styles, shows_all_tasks = PLANS[name]
-  own = {
-    (method, main): [run for run in runs if run[:2] == (method, main)]
-    for method in styles
-    for main in MAIN_TASKS
-  }
-  mains = [main for main in MAIN_TASKS if any(own[m, main] for m in styles)]
-  cells = [[(main, main) for main in MAIN_TASKS]]
-  if shows_all_tasks:
+  styles = FIGURES[name]
+  runs = [run for run in runs if run.method in styles]
+  cells, size = [[(main, main) for main in MAIN_TASKS]], (2.75, 2.5)
+  if name == "multitask":
+    present = {run.main_task for run in runs}
+    mains = [main for main in MAIN_TASKS if main in present]
     cells = [[(main, task) for task in task_set(main)] for main in mains]
-  strata = {cell: [cell] for cell in itertools.chain(*cells)}
-  if kind == "iqm" and quantity == run_results.SUCCESS and not shows_all_tasks:
-    strata[_ALL] = cells[0]
-    cells = [[*cells[0], _ALL]]
+    size = (1.9, 1.7)
+  elif kind == "iqm" and quantity == run_results.SUCCESS:
+    cells[0].append(_ALL)
   lines: Lines = {}
-  for cell, parts in strata.items():
-    for method in styles:
-      samples = [(own[method, main], task) for main, task in parts]
-      curve = run_results.curve(samples, quantity)
-      if curve is not None:
-        estimate = statistics.ESTIMATORS[kind](curve.scores)
-        lines[cell, method] = curve, estimate
+  for cell, method in itertools.product(itertools.chain(*cells), styles):
+    strata = [(main, main) for main in MAIN_TASKS] if cell == _ALL else [cell]
+    samples = [
+      ([run for run in runs if run[:2] == (method, main)], task)
+      for main, task in strata
+    ]
+    curve = run_results.curve(samples, quantity)
+    if curve is not None:
+      estimate = statistics.ESTIMATORS[kind](curve.scores)
+      lines[cell, method] = curve, estimate
   if not lines:
     raise ValueError(
       f"no run for the figure {name!r}; it shows: {', '.join(styles)}"
     )
-  size = (1.9, 1.7) if shows_all_tasks else (2.75, 2.5)
   _save(drawing.figure(cells, lines, styles, quantity, kind, size), output)
-  rows = [
-    (*cell, method, "" if method in run_results.WITHOUT_STEPS else step,
-     len(curve.scores), kind, *(f"{value:.6g}" for value in values))
-    for (cell, method), (curve, estimate) in lines.items()
-    for step, *values in zip(curve.steps, *estimate, strict=True)
-  ]  # fmt: skip
-  csv_files.write(
-    pathlib.Path(output).with_suffix(".csv"),
-    COLUMNS,
-    [dict(zip(COLUMNS, row, strict=True)) for row in rows],
-  )
-  return _notes(styles, own)
+  rows = _numbers(lines, kind)
+  csv_files.write(pathlib.Path(output).with_suffix(".csv"), COLUMNS, rows)
+  return _notes(styles, runs)
 
 
 def learning_curve(
@@ -165,13 +150,25 @@ def _save(figure: matplotlib.figure.Figure, output: files.Path) -> None:
     figure.savefig(aside, dpi=200)
 
 
-def _notes(
-  styles: Mapping[str, Style], own: Mapping[tuple[str, str], list[Run]]
-) -> list[str]:
+def _numbers(lines: Lines, kind: str) -> list[dict[str, Any]]:
+  """The rows of the CSV."""
+  rows = [
+    (*cell, method, "" if method in run_results.WITHOUT_STEPS else step,
+     len(curve.scores), kind, *(f"{value:.6g}" for value in values))
+    for (cell, method), (curve, estimate) in lines.items()
+    for step, *values in zip(curve.steps, *estimate, strict=True)
+  ]  # fmt: skip
+  return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+
+
+def _notes(styles: Mapping[str, Style], runs: Sequence[Run]) -> list[str]:
   """What the figure lacks, method by method, and which seeds were cut."""
   notes = []
   for method, style in styles.items():
-    lacking = [main for main in MAIN_TASKS if not own[method, main]]
+    present = {run.main_task for run in runs if run.method == method}
+    lacking = [main for main in MAIN_TASKS if main not in present]
     if lacking:
       notes.append(f"no runs of {style.label} on {', '.join(lacking)}")
-  return sum((run_results.uneven(r) for r in own.values() if r), notes)
+  for _, seeds in itertools.groupby(runs, lambda run: run[:2]):
+    notes += run_results.uneven(list(seeds))
+  return notes

@@ -125,7 +125,7 @@ def uneven(runs: Sequence[Run]) -> list[str]:
 
 def _points(run: Run, task: str, quantity: str) -> dict[int, float]:
   """Environment step -> mean over the episodes of that evaluation."""
-  values = defaultdict(list)
+  values: dict[int, list[float]] = defaultdict(list)
   for row in run.rows:
     value = row.success if quantity == SUCCESS else row.episode_return
     if row.task == task and value is not None:

@@ -3,9 +3,9 @@
 The paper reports mean and standard deviation. With few seeds the interquartile
 mean with stratified bootstrap intervals is the steadier summary (Agarwal et
 al., "Deep reinforcement learning at the edge of the statistical precipice").
-Their library needs an older pandas than today's; SciPy has the same parts.
+rliable, their library, needs an older pandas than today's; SciPy has its parts.
 
-Scores are float [R, K, T]: runs, tasks and points, such as environment steps or
+Scores are float [R, K, T]: runs, tasks, and points such as environment steps or
 numbers of demonstrations.
 """
 
@@ -15,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 import scipy.stats
 
-_CONFIDENCE = 0.95
-_RESAMPLES = 2_000
 _TRIMMED = 0.25  # share cut from each end
 
 
@@ -82,19 +80,18 @@ def _bootstrap(statistic: Callable, *strata: np.ndarray) -> Estimate:
 
   Args:
     statistic: a function of the strata and `axis=-1`, vectorised.
-    *strata: float [T, runs] each; with a single run the band has no height.
+    *strata: float [T, runs] each; a single run has a band without height.
   """
   middle = statistic(*strata, axis=-1)
   if min(stratum.shape[-1] for stratum in strata) == 1:
     return Estimate(middle, middle, middle)
-  interval = scipy.stats.bootstrap(
+  found = scipy.stats.bootstrap(
     strata,
     statistic,
     axis=-1,
-    vectorized=True,
-    n_resamples=_RESAMPLES,
-    confidence_level=_CONFIDENCE,
+    n_resamples=2_000,
+    confidence_level=0.95,
     method="percentile",
     rng=np.random.default_rng(0),
-  ).confidence_interval
-  return Estimate(middle, interval.low, interval.high)
+  )
+  return Estimate(middle, *found.confidence_interval)

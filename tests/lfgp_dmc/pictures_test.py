@@ -7,7 +7,8 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.pictures import video
+from lfgp_dmc.pictures import film_strips, video
+from lfgp_dmc.pictures.recorder import Clip
 
 
 def _frames(count=8, height=47, width=63):
@@ -65,6 +66,19 @@ class VideoTest(parameterized.TestCase):
       with self.assertRaisesRegex(ValueError, message):
         video.write(self._folder / name, bad)
     self.assertEmpty(list(self._folder.iterdir()))
+
+
+class FilmStripTest(absltest.TestCase):
+  def test_shows_the_first_success_from_the_reset_on(self):
+    def play(seed, every=0, max_steps=40, until_success_of=None):
+      success = {"lift": 12} if seed == 7 else {}
+      frames = list(range(2 * max_steps + 1)) if every else []
+      return Clip(frames, [], success, max_steps, checks=2)
+
+    found = film_strips.row(play, "lift", range(5, 9), 4)
+    self.assertEqual(found, ([0, 8, 16, 24], 7, 12))
+    with self.assertRaisesRegex(ValueError, "no success of lift in 2 episodes"):
+      film_strips.row(play, "lift", range(2), 4)
 
 
 if __name__ == "__main__":
