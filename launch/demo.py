@@ -26,9 +26,9 @@ from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.launch.environment_spec import World
-from lfgp_dmc.pictures import recorder, video
+from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.study import learning_curve
+from lfgp_dmc.study import figures, run_results
 from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
@@ -64,11 +64,8 @@ def main() -> int:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
   columns = _columns(config, path, stored)
-  figure = learning_curve.learning_curve(
-    [path / "evaluation.csv"],
-    path / "learning_curve.png",
-    f"{config.algorithm} on {config.main_task}".replace("_", " "),
-  )
+  figure = path / "learning_curve.png"
+  figures.learning_curve(run_results.read_runs([path])[0], figure)
   clip = _film(config, path, columns, stored)
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
@@ -216,7 +213,7 @@ def _play(
       environment,
       actor,
       environment.reset(),
-      lambda *_, task=row.task: task,
+      task_switch.one_task(row.task),
       seed,
       recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
       max_steps=_MOST_SECONDS * world.control_hz,

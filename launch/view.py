@@ -1,4 +1,4 @@
-"""Opens dm_control's viewer on a task, alone or with someone acting.
+"""Opens dm_control's viewer on a task, with or without a policy.
 
   python launch/view.py --task=stack
   python launch/view.py --task=insert --expert=scripted
@@ -14,7 +14,6 @@ import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
 from lfgp_dmc.launch import command, policies
-from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import World
 
 _TASK = flags.DEFINE_string(
@@ -27,18 +26,16 @@ _SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
 
 def main() -> None:
   """Opens the window."""
-  task = _TASK.value
+  task, cast = _TASK.value, None
   if task and not _RUN.value:
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
-  cast = None
+  if _EXPERT.value:
+    command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   if _RUN.value or _EXPERT.value:
-    if _EXPERT.value:
-      command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
     cast = policies.find(_RUN.value, _EXPERT.value, task)
-    task = task or cast.main_task
-    command.check_choice("task", task, cast.tasks)
+    task = command.check_choice("task", task or cast.main_task, cast.tasks)
   if not graphics.has_display():
-    raise UserError(
+    raise command.UserError(
       "the viewer needs a display, and there is none (DISPLAY is not set); "
       "without one, launch/render_policy.py makes videos"
     )

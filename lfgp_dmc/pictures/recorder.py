@@ -135,18 +135,23 @@ _TAIL = 20  # 50 ms checks shown after a success
 
 
 def prepare(environment: dm_env.Environment, look: Look) -> None:
-  """Sets what must be set before an environment's first picture."""
+  """Sets what must be set before an environment's first picture.
+
+  Raises:
+    ValueError: the environment cannot be drawn, or lacks the camera.
+  """
   physics = getattr(environment, "physics", None)
-  if physics is not None and not look.shadows:
-    physics.model.light_castshadow[:] = 0
-    physics.model.vis.quality.offsamples = 0
-
-
-def picture(environment: dm_env.Environment, look: Look) -> np.ndarray:
-  """The environment as it is, uint8 [height, width, 3]."""
-  return environment.physics.render(  # type: ignore[attr-defined]
-    look.height, look.width, camera_id=look.camera
-  )
+  if physics is None:
+    raise ValueError("this environment has no physics to render")
+  model = physics.model
+  cameras = [model.id2name(i, "camera") for i in range(model.ncam)]
+  if look.camera not in cameras:
+    raise ValueError(
+      f"unknown camera {look.camera!r}; valid: {', '.join(cameras)}"
+    )
+  if not look.shadows:
+    model.light_castshadow[:] = 0
+    model.vis.quality.offsamples = 0
 
 
 def _successes(timestep: dm_env.TimeStep) -> list[str]:
@@ -159,7 +164,9 @@ def _successes(timestep: dm_env.TimeStep) -> list[str]:
 
 
 def _frame(environment, timestep, task: str, clip: Clip, look: Look):
-  frame = picture(environment, look)
+  frame = environment.physics.render(
+    look.height, look.width, camera_id=look.camera
+  )
   if not look.overlay:
     return frame
   goal = look.scheduled_for or task

@@ -1,4 +1,4 @@
-"""Figures and videos are files that other programs read."""
+"""Videos are files that other programs read."""
 
 import json
 import pathlib
@@ -7,10 +7,8 @@ import imageio.v2 as imageio
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.data import evaluation_csv
-from lfgp_dmc.data.evaluation_csv import EvaluationRow
-from lfgp_dmc.pictures import video
-from lfgp_dmc.study import learning_curve
+from lfgp_dmc.pictures import film_strips, video
+from lfgp_dmc.pictures.recorder import Clip
 
 
 def _frames(count=8, height=47, width=63):
@@ -70,37 +68,17 @@ class VideoTest(parameterized.TestCase):
     self.assertEmpty(list(self._folder.iterdir()))
 
 
-class FiguresTest(absltest.TestCase):
-  def _csv(self, seed: int) -> pathlib.Path:
-    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
-    random = np.random.default_rng(seed)
-    rows = [
-      EvaluationRow(step, task, i, seed, int(random.random() * 4 < k), None, k)
-      for k, step in enumerate((0, 10_000, 20_000))
-      for task in ("stack", "reach")
-      for i in range(5)
-    ]
-    evaluation_csv.append_csv(path, rows)
-    return path
+class FilmStripTest(absltest.TestCase):
+  def test_shows_the_first_success_from_the_reset_on(self):
+    def play(seed, every=0, max_steps=40, until_success_of=None):
+      success = {"lift": 12} if seed == 7 else {}
+      frames = list(range(2 * max_steps + 1)) if every else []
+      return Clip(frames, [], success, max_steps, checks=2)
 
-  def test_curves_of_one_run_and_of_several(self):
-    paths = [self._csv(0), self._csv(1)]
-    for runs, quantity in ((paths[:1], "success"), (paths, "return")):
-      output = paths[0].parent / "figures" / f"{quantity}.png"
-      learning_curve.learning_curve(runs, output, "LfGP", quantity)
-      picture = imageio.imread(output)
-      self.assertGreater(picture.shape[1], 800)
-      self.assertGreater(np.ptp(picture[..., :3]), 200)
-
-  def test_nothing_to_draw_is_an_error(self):
-    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
-    evaluation_csv.append_csv(path, [])
-    with self.assertRaisesRegex(ValueError, "no evaluation rows"):
-      learning_curve.learning_curve([path], path.with_suffix(".png"))
-    with self.assertRaisesRegex(ValueError, "valid: success, return"):
-      learning_curve.learning_curve(
-        [path], path.with_suffix(".png"), "", "regret"
-      )
+    found = film_strips.row(play, "lift", range(5, 9), 4)
+    self.assertEqual(found, ([0, 8, 16, 24], 7, 12))
+    with self.assertRaisesRegex(ValueError, "no success of lift in 2 episodes"):
+      film_strips.row(play, "lift", range(2), 4)
 
 
 if __name__ == "__main__":
