@@ -16,11 +16,11 @@ SCHEDULED = "scheduled"
 
 
 class Stage:
-  """A cast in its environment; each clip depends on its seed alone."""
+  """A spec in its environment; each clip depends on its seed alone."""
 
   def __init__(
     self,
-    cast: policies.Cast,
+    spec: policies.PolicySpec,
     task: str,
     look: recorder.Look,
     is_play: bool = False,
@@ -28,7 +28,7 @@ class Stage:
     """Builds the environment.
 
     Args:
-      cast: the policy.
+      spec: the policy.
       task: an intention, or `SCHEDULED`.
       look: how frames are made.
       is_play: whether the expert goes from task to task.
@@ -39,9 +39,9 @@ class Stage:
     if fault := graphics.fault():
       raise command.UserError(fault)
     if task == SCHEDULED:
-      look = dataclasses.replace(look, scheduled_for=cast.main_task)
-    self._cast, self._task, self._is_play = cast, task, is_play
-    self._look, self._environment = look, cast.world.build()
+      look = dataclasses.replace(look, scheduled_for=spec.main_task)
+    self._spec, self._task, self._is_play = spec, task, is_play
+    self._look, self._environment = look, spec.world.build()
     with command.checked_input():
       recorder.prepare(self._environment, look)
 
@@ -62,38 +62,38 @@ class Stage:
       environment.reseed(derived)
     else:
       environment.close()
-      self._environment = environment = self._cast.world.build(seed=derived)
+      self._environment = environment = self._spec.world.build(seed=derived)
     switch = task_switch.one_task(self._task)
     if self._is_play:
-      tasks = lfgp_dmc.task_set(self._cast.main_task)
+      tasks = lfgp_dmc.task_set(self._spec.main_task)
       switch = task_switch.Play(environment, tasks, seed)
     elif self._task == SCHEDULED:
-      switch = scheduled(self._cast, seed)
+      switch = scheduled(self._spec, seed)
     look = dataclasses.replace(self._look, every=every)
-    first, actor = environment.reset(), self._cast.make()
+    first, actor = environment.reset(), self._spec.make()
     return recorder.record(
       environment, actor, first, switch, seed, look, **limits
     )
 
 
-def scheduled(cast: policies.Cast, seed: int) -> recorder.Switch:
+def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
   """The run's own scheduler, as of its last checkpoint.
 
   Raises:
     UserError: a policy folder has no scheduler.
   """
-  if cast.folder is None or "agent" not in cast.config:
+  if spec.folder is None or "agent" not in spec.config:
     raise command.UserError("--task=scheduled needs the folder of a whole run")
   from lfgp_dmc.agents.schedulers import make_scheduler
   from lfgp_dmc.launch import configs
 
   with command.checked_input():
-    agent = configs.from_dict(run_folder.settings(cast.config)).agent
+    agent = configs.from_dict(run_folder.settings(spec.config)).agent
     periods = -(-agent.episode_steps // agent.xi)
     scheduler = make_scheduler(
-      agent, cast.tasks, 0, periods, np.random.default_rng(seed)
+      agent, spec.tasks, 0, periods, np.random.default_rng(seed)
     )
-  path = checkpoints.latest(run_folder.RunFolder(cast.folder).checkpoints)
+  path = checkpoints.latest(run_folder.RunFolder(spec.folder).checkpoints)
   if path is not None:
     scheduler.load_state_dict(checkpoints.load(path)["agent"]["scheduler"])
   scheduler.begin_episode()
@@ -102,7 +102,7 @@ def scheduled(cast: policies.Cast, seed: int) -> recorder.Switch:
   def choose(step: int, timestep: dm_env.TimeStep) -> str:
     nonlocal chosen
     if step % agent.xi == 0:
-      chosen = cast.tasks[scheduler.next_task()]
+      chosen = spec.tasks[scheduler.next_task()]
     return chosen
 
   return choose

@@ -95,21 +95,21 @@ def _plan() -> CollectionPlan:
   Raises:
     UserError: the expert cannot do all tasks, or acts at another rate.
   """
-  cast = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
-  make_actor = cast.make
+  spec = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
+  make_actor = spec.make
   if _EXPERT.value != policies.SCRIPTED:
-    make_actor = functools.partial(sampling_actor, cast.make)
+    make_actor = functools.partial(sampling_actor, spec.make)
   tasks = lfgp_dmc.task_set(_TASK.value)
-  if cast.world.control_hz != _HERTZ.value:
+  if spec.world.control_hz != _HERTZ.value:
     raise command.UserError(
       f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
-      f"{cast.world.control_hz} Hz"
+      f"{spec.world.control_hz} Hz"
     )
-  lacking = [task for task in tasks if task not in cast.tasks]
+  lacking = [task for task in tasks if task not in spec.tasks]
   if lacking:
     raise command.UserError(
       f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
-      f"--task={_TASK.value}; it can do: {', '.join(cast.tasks)}"
+      f"--task={_TASK.value}; it can do: {', '.join(spec.tasks)}"
     )
   return CollectionPlan(
     functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),

@@ -25,7 +25,7 @@ from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import figures, run_results
@@ -100,7 +100,7 @@ def table(
 
 
 def _columns(
-  config: RunConfig, path: pathlib.Path, stored: policies.Cast | None
+  config: RunConfig, path: pathlib.Path, stored: policies.PolicySpec | None
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
   rows = evaluation_csv.read_csv(path / "evaluation.csv")
@@ -125,7 +125,7 @@ def _columns(
   return columns
 
 
-def _stored_policy(main_task: str) -> policies.Cast | None:
+def _stored_policy(main_task: str) -> policies.PolicySpec | None:
   """The policy to show beside the fresh one, if there is any.
 
   Raises:
@@ -134,16 +134,16 @@ def _stored_policy(main_task: str) -> policies.Cast | None:
   folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
-  cast = policies.find(folder, "")
-  if main_task not in cast.tasks:
+  spec = policies.find(folder, "")
+  if main_task not in spec.tasks:
     raise command.UserError(
       f"--stored={folder} cannot do {main_task}; it can do: "
-      f"{', '.join(cast.tasks)}"
+      f"{', '.join(spec.tasks)}"
     )
-  return cast
+  return spec
 
 
-def _world(config: RunConfig, stored: policies.Cast) -> World:
+def _world(config: RunConfig, stored: policies.PolicySpec) -> EnvironmentSpec:
   """The run's environment, at the control rate of the stored policy."""
   return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
 
@@ -153,7 +153,7 @@ def _evaluate(
   name: str,
   make_actor: Callable[[], Actor],
   tasks: Sequence[str],
-  world: World | None = None,
+  world: EnvironmentSpec | None = None,
 ) -> list[EvaluationRow]:
   print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(
@@ -170,7 +170,7 @@ def _film(
   config: RunConfig,
   path: pathlib.Path,
   columns: Mapping[str, Sequence[EvaluationRow]],
-  stored: policies.Cast | None,
+  stored: policies.PolicySpec | None,
 ) -> pathlib.Path | None:
   """Renders evaluated episodes again: of the main task, then of others.
 
@@ -201,7 +201,7 @@ def _film(
 
 
 def _play(
-  world: World, actor: Actor, episodes: Sequence[EvaluationRow]
+  world: EnvironmentSpec, actor: Actor, episodes: Sequence[EvaluationRow]
 ) -> list[np.ndarray]:
   """The frames of evaluated episodes, played again."""
   environment: Any = world.build()

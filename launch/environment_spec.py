@@ -16,7 +16,7 @@ _REWARD = "reward/"
 
 
 @dataclasses.dataclass(frozen=True)
-class World:
+class EnvironmentSpec:
   """What it takes to build an environment; picklable.
 
   Attributes:

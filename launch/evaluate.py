@@ -55,15 +55,15 @@ def main() -> None:
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
   rows: list[evaluation_csv.EvaluationRow] = []
-  for cast, tasks in _plan():
+  for spec, tasks in _plan():
     rows += evaluation.evaluate(
-      cast.world.factory(show_rewards=True),
-      cast.make,
+      spec.world.factory(show_rewards=True),
+      spec.make,
       tasks,
       _EPISODES.value,
       _SEED.value,
       _WORKERS.value or command.cores(),
-      env_step=cast.env_step,
+      env_step=spec.env_step,
     )
   print(evaluation_csv.success_table(rows))
   if output is not None:
@@ -71,11 +71,11 @@ def main() -> None:
     print(f"\n{output}")
 
 
-def _plan() -> list[tuple[policies.Cast, tuple[str, ...]]]:
+def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
   """Who plays which tasks; an expert each task in its own environment."""
   if _RUN.value or not _EXPERT.value:
-    cast = policies.find(_RUN.value, _EXPERT.value)
-    return [(cast, choose_tasks(_TASKS.value, cast.tasks))]
+    spec = policies.find(_RUN.value, _EXPERT.value)
+    return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
   command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   own = _MAIN_TASK.value
   if own:
@@ -89,7 +89,7 @@ def _plan() -> list[tuple[policies.Cast, tuple[str, ...]]]:
   return [(_scripted(task), (task,)) for task in tasks]
 
 
-def _scripted(task: str) -> policies.Cast:
+def _scripted(task: str) -> policies.PolicySpec:
   return policies.find("", policies.SCRIPTED, task, _HERTZ.value)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import lfgp_dmc
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.types import Actor
 
@@ -22,12 +22,12 @@ _ARRAYS = "policy.safetensors"
 
 
 @dataclasses.dataclass(frozen=True)
-class Cast:
+class PolicySpec:
   """An actor to be made, and where it is at home."""
 
   make: Callable[[], Actor]  # picklable
   name: str  # for tables and sidecars
-  world: World
+  world: EnvironmentSpec
   tasks: tuple[str, ...]  # what it can do, the main task first
   folder: pathlib.Path | None = None  # of a run
   config: dict[str, Any] = dataclasses.field(default_factory=dict)
@@ -56,7 +56,9 @@ def stored_policy(folder: str) -> Actor:
   return Policy.load(folder)
 
 
-def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
+def find(
+  run: str, expert: str, task: str = "", control_hz: int = 20
+) -> PolicySpec:
   """The actor that `--run` or `--expert` names.
 
   Args:
@@ -74,11 +76,13 @@ def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
     task = task or lfgp_dmc.MAIN_TASKS[0]
     tasks = (task, *(t for t in lfgp_dmc.ALL_TASKS if t != task))
     make = functools.partial(scripted_expert, control_hz)
-    return Cast(make, "scripted expert", World(task, "", control_hz), tasks)
+    return PolicySpec(
+      make, "scripted expert", EnvironmentSpec(task, "", control_hz), tasks
+    )
   return _of_folder(run or expert)
 
 
-def _of_folder(folder: str) -> Cast:
+def _of_folder(folder: str) -> PolicySpec:
   path = pathlib.Path(folder)
   try:
     config = run_folder.read_config(path)
@@ -86,13 +90,13 @@ def _of_folder(folder: str) -> Cast:
       raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
     policy: Any = stored_policy(folder)
     main_task = config.get("main_task", policy.tasks[0])
-    world = World(
+    world = EnvironmentSpec(
       main_task, config.get("environment", ""), config.get("control_hz", 20)
     )
     world.check()
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
-  return Cast(
+  return PolicySpec(
     functools.partial(stored_policy, os.fspath(path)),
     path.name,
     world,

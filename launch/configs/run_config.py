@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 from lfgp_dmc.launch.configs import algorithms
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
 
@@ -95,9 +95,9 @@ class RunConfig:
       raise ValueError("\n".join(faults))
 
   @property
-  def world(self) -> World:
+  def world(self) -> EnvironmentSpec:
     """Where the agent acts."""
-    return World(self.main_task, self.environment, self.control_hz)
+    return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
 
   @property
   def uses_demonstrations(self) -> bool:
