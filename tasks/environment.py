@@ -10,7 +10,7 @@ from dm_control.composer import observation
 from dm_control.rl import control
 
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.initialisers import Start
+from lfgp_dmc.tasks.initialisers import Request
 from lfgp_dmc.tasks.play import PlayTask
 
 
@@ -122,13 +122,11 @@ class PlayEnvironment(composer.Environment):
     """
     if fingers is not None and not 0.0 <= fingers <= 1.0:
       raise ValueError(f"fingers={fingers!r}; valid is 0 (closed) to 1 (open)")
-    self._task.request_start(
-      Start(
-        tcp=_checked("tcp", tcp, 3),
-        blue=_checked("blue", blue, 7),
-        green=_checked("green", green, 7),
-        fingers=fingers,
-      )
+    self._task.request = Request(
+      tcp=_checked("tcp", tcp, 3),
+      blue=_checked("blue", blue, 7),
+      green=_checked("green", green, 7),
+      fingers=fingers,
     )
     return self.reset()
 
