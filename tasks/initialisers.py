@@ -11,12 +11,12 @@ from dm_control import mjcf
 from dm_control.utils import inverse_kinematics
 
 from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.control import DOWN
 from lfgp_dmc.tasks.entities import Panda
 from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL, HOME
 from lfgp_dmc.tasks.goals.starts import BlockStart
 from lfgp_dmc.tasks.world import World
 
-_DOWN = (0.0, 1.0, 0.0, 0.0)  # the hand points down
 _GAP = 0.0005  # m, least gap between two sampled blocks
 _IK_TOLERANCE = 1e-6
 
@@ -79,7 +79,7 @@ def _place_arm(physics, panda: Panda, tcp, fingers: float) -> None:
     physics,
     panda.tcp.full_identifier,
     target_pos=tcp,
-    target_quat=_DOWN,
+    target_quat=DOWN,
     joint_names=[joint.full_identifier for joint in panda.joints],
     tol=_IK_TOLERANCE,
     max_steps=200,
@@ -131,7 +131,7 @@ def _sample_pose(random_state, spawn: str) -> np.ndarray:
 
 
 def _overlap(blue: np.ndarray, green: np.ndarray) -> bool:
-  """Do two upright blocks' footprints overlap at the same height."""
+  """Whether two upright blocks' footprints overlap at the same height."""
   if abs(blue[2] - green[2]) >= 2 * ws.BLOCK_HALF:
     return False
   gap = green[:2] - blue[:2]

@@ -8,8 +8,8 @@ import numpy as np
 def _cube_rotations() -> np.ndarray:
   """The cube's 24 rotations as unit quaternions w x y z, float [24, 4].
 
-  They are the 24 units of the binary octahedral group up to sign: the axes,
-  the sums of two axes and the sums of all four, normalised.
+  The binary octahedral group up to sign: the axes of the quaternions, sums of
+  two axes and sums of all four, normalised.
   """
   found: list[tuple[float, ...]] = []
   for count in (1, 2, 4):
@@ -31,8 +31,6 @@ def _right_matrix(quat) -> np.ndarray:
 
 # [24, 4, 4]: applied to a quaternion, all equal-looking ones of a cube.
 _SYMMETRIES = np.stack([_right_matrix(quat) for quat in _cube_rotations()])
-
-
 _TO_COSINES = np.ascontiguousarray(_SYMMETRIES[:, 0].T)  # [4, 24]
 
 

@@ -16,7 +16,7 @@ class Snapshot:
     blue_speed: |v_b|.
     blue_acceleration: |a_b|, m/s^2: velocity change over the last physics
       step; 0 at reset.
-    blue_on_green, blue_on_tray, blue_on_robot: is there such a contact.
+    blue_on_green, blue_on_tray, blue_on_robot: blue's contacts.
     action: the last action, clipped; a_g is its fourth value. Zeros at reset.
   """
 

@@ -30,6 +30,7 @@ GREEN_SLOT = (*GREEN_XY, INSERTED_Z)  # p_s of the paper, for green
 # The TCP's set-point is clipped to this box: 30 x 30 x 14.5 cm.
 SET_POINT_LOW = (-0.15, 0.35, 0.145)
 SET_POINT_HIGH = (0.15, 0.65, 0.29)
+SET_POINT_SPEED = 0.2  # m/s at |a| = 1: 1 cm per 50 ms
 
 # Start states: spawn="published" samples in the central 15 x 15 cm.
 SPAWN_HALF = 0.075

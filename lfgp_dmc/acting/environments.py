@@ -15,7 +15,7 @@ import numpy as np
 from lfgp_dmc import observations
 
 REWARD_PREFIX = "reward/"
-_TASK_PREFIXES = (
+TASK_PREFIXES = (
   observations.SUCCESS_PREFIX,
   observations.CONDITION_PREFIX,
   REWARD_PREFIX,
@@ -38,7 +38,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   names = [
     name
     for name, part in spec.items()
-    if not name.startswith(_TASK_PREFIXES)
+    if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
   if not names:

@@ -54,8 +54,7 @@ def _hover(view: View) -> motion.Vector:
 
 def reach(view: View) -> Command:
   """Puts the open fingers around blue."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
+  if freeing := place.free_blue(view):
     return freeing
   if is_held(view, view.blue):
     return Command(motion.stay(view), CLOSE)
@@ -64,8 +63,7 @@ def reach(view: View) -> Command:
 
 def lift(view: View) -> Command:
   """Grasps blue and takes it up."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
+  if freeing := place.free_blue(view):
     return freeing
   if not is_held(view, view.blue):
     return grasp.grasp(view, view.blue)
@@ -75,8 +73,7 @@ def lift(view: View) -> Command:
 
 def move_object(view: View) -> Command:
   """Grasps blue and carries it round a circle over the tray."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
+  if freeing := place.free_blue(view):
     return freeing
   if not is_held(view, view.blue):
     return grasp.grasp(view, view.blue)

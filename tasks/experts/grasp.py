@@ -29,14 +29,14 @@ _ASKEW = math.radians(1.4)
 _OPENING = 0.02  # change of the opening in a step of fingers that open
 
 
-def room(
+def _room(
   view: View, target: BlockView, most_y: float
 ) -> tuple[float, float] | None:
   """How far to grip beside the target's centre, so that the fingers fit.
 
   Args:
     view: the observation.
-    target: the block to get between the fingers.
+    target: the block to grip.
     most_y: largest offset along y, m.
 
   Returns:
@@ -63,7 +63,7 @@ def room(
 
 
 def hover_height(view: View) -> float:
-  """Height of the TCP from which it may cross the blocks, m."""
+  """Height at which the TCP may cross the blocks, m."""
   return max(view.blue.z, view.green.z) + HOVER
 
 
@@ -74,16 +74,12 @@ def reach(
   most_y: float = 0.010,
 ) -> Command:
   """Brings the open fingers around a block, pushing it free if need be."""
-  offset = room(view, target, most_y)
+  offset = _room(view, target, most_y)
   if is_between_fingers(view, target) and view.opening > 0.7:
     offset = offset or (0.0, 0.0)
   elif offset is None:
-    return push_free(view, target)
-  goal = (
-    target.x + offset[0],
-    target.y + offset[1],
-    max(target.z + height, ws.SET_POINT_LOW[2]),
-  )
+    return _push_free(view, target)
+  goal = (target.x + offset[0], target.y + offset[1], _low(target, height))
   if is_between_fingers(view, target):
     return Command(motion.servo(view, goal), OPEN, noise=0.6)
   # Closed fingers wait above until they are open.
@@ -108,13 +104,14 @@ def grasp(view: View, target: BlockView, square: bool = False) -> Command:
     if side and view.opening > 0.92:
       return _sweep(view, target, side)
     if _is_centred(view, target):
-      goal = (
-        target.x,
-        target.y,
-        max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
-      )
+      goal = (target.x, target.y, _low(target))
       return Command(motion.servo(view, goal, gain=0.2), CLOSE, noise=0.5)
   return reach(view, target)
+
+
+def _low(target: BlockView, height: float = GRIP_HEIGHT) -> float:
+  """The TCP's height so far above a block's centre, within the box, m."""
+  return max(target.z + height, ws.SET_POINT_LOW[2])
 
 
 def _is_centred(view: View, target: BlockView) -> bool:
@@ -122,7 +119,7 @@ def _is_centred(view: View, target: BlockView) -> bool:
   dx, dy, dz = across(view, target)
   if view.opening < 0.92:
     return True
-  offset = room(view, target, 0.010) or (0.0, 0.0)
+  offset = _room(view, target, 0.010) or (0.0, 0.0)
   return (
     abs(dx - offset[0]) < 0.006 and abs(dy - offset[1]) < 0.006 and dz < 0.015
   )
@@ -130,20 +127,16 @@ def _is_centred(view: View, target: BlockView) -> bool:
 
 def _sweep(view: View, target: BlockView, side: float) -> Command:
   """Pushes a block along y with one open finger, whose face squares it."""
-  goal = (
-    target.x,
-    view.set_point[1] + 0.02 * side,
-    max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
-  )
+  goal = (target.x, view.set_point[1] + 0.02 * side, _low(target))
   return Command(motion.servo(view, goal, speed=0.75), OPEN, noise=0.6)
 
 
 def _sweeping_side(view: View, target: BlockView) -> float:
   """Which way along y to sweep a block; 0: it is where sweeps end.
 
-  Where the block is decides, as that is easier to see, and to imitate, than
-  a degree of yaw: outwards until it is 10 cm from the middle. Only a block
-  that is askew even there is swept back in, to be swept out again.
+  The block's place decides, which is easier to observe and to imitate than a
+  degree of yaw: outwards until it is 10 cm from the middle. Only a block that
+  is askew even there is swept back in, to be swept out again.
   """
   off_middle = target.y - ws.CENTRE_XY[1]
   outwards = math.copysign(1.0, off_middle)
@@ -155,14 +148,14 @@ def _sweeping_side(view: View, target: BlockView) -> float:
   return outwards
 
 
-def push_free(view: View, target: BlockView) -> Command:
+def _push_free(view: View, target: BlockView) -> Command:
   """Pushes a block along x with closed fingers, away from its neighbour."""
   other = view.other(target)
   side = 1.0 if target.x > other.x else -1.0
   if abs(other.x) > 0.07:  # towards the middle, not up the wall
     side = -math.copysign(1.0, other.x)
   dx, dy, dz = across(view, target)
-  low = max(target.z + 0.004, ws.SET_POINT_LOW[2])
+  low = _low(target, 0.004)
   behind = -side * (target.half + 0.022)
   if dz < 0.022 and abs(dy) < 0.012 and side * dx < -0.018:
     goal = (view.set_point[0] + side * 0.03, target.y, low)

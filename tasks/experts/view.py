@@ -68,11 +68,7 @@ def look(observation: np.ndarray, control_hz: int = 20) -> View:
   before = (o[10] + o[11]) / 2
   return View(
     tcp=(o[0], o[1], o[2]),
-    set_point=(
-      o[0] + _LAG * o[3],
-      o[1] + _LAG * o[4],
-      o[2] + _LAG * o[5],
-    ),
+    set_point=(o[0] + _LAG * o[3], o[1] + _LAG * o[4], o[2] + _LAG * o[5]),
     opening=opening,
     opening_rate=opening - before,
     blue=_block(o[12:19]),
@@ -88,23 +84,20 @@ def _block(pose: list[float]) -> BlockView:
   return BlockView(x, y, z, yaw, tilt)
 
 
-def across(view: View, block: BlockView) -> tuple[float, float, float]:
+def across(view: View, block: BlockView) -> Vector:
   """TCP minus block, m."""
-  return (
-    view.tcp[0] - block.x,
-    view.tcp[1] - block.y,
-    view.tcp[2] - block.z,
-  )
+  x, y, z = view.tcp
+  return (x - block.x, y - block.y, z - block.z)
 
 
 def is_between_fingers(view: View, block: BlockView) -> bool:
-  """Is the block in the gap, low enough to be gripped."""
+  """Whether the block is in the gap, low enough to be gripped."""
   dx, dy, dz = across(view, block)
   return abs(dx) < 0.018 and abs(dy) < 0.022 and -0.014 < dz < 0.019
 
 
 def is_held(view: View, block: BlockView) -> bool:
-  """Have the fingers stopped at the block's width."""
+  """Whether the fingers have stopped at the block's width."""
   low, high = _GRIP
   return (
     abs(view.opening_rate) < _STILL
@@ -114,6 +107,6 @@ def is_held(view: View, block: BlockView) -> bool:
 
 
 def is_on(upper: BlockView, lower: BlockView) -> bool:
-  """Does `upper` rest on `lower`: about 4 cm higher, footprints crossing."""
+  """Whether `upper` rests on `lower`: 4 cm higher, footprints crossing."""
   apart = max(abs(upper.x - lower.x), abs(upper.y - lower.y))
   return apart < 0.030 and 0.028 < upper.z - lower.z < 0.0455

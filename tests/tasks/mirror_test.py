@@ -9,7 +9,7 @@ from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.task_names import ALL_TASKS
 from lfgp_dmc.tasks import mirror
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.experts import make_expert
+from lfgp_dmc.tasks.experts import ScriptedExpert
 
 _STEPS = 100
 # About twice the difference that one step in twenty exceeds, by component: the
@@ -40,7 +40,7 @@ def _begin(environment, side):
 
 def _attempt(task, steps=_STEPS):
   environment = tasks.load(task, seed=5, control_hz=5)
-  expert = make_expert(noise=0.0, control_hz=5)
+  expert = ScriptedExpert(noise=0.0, control_hz=5)
   expert.begin(task, 0)
   timestep = environment.reset()
   rows = []
@@ -53,7 +53,7 @@ def _attempt(task, steps=_STEPS):
 class MirrorTest(parameterized.TestCase):
   @parameterized.parameters(*(t for t in ALL_TASKS if t != "move_object"))
   def test_an_expert_does_in_the_image_the_image_of_what_it_does(self, task):
-    expert = make_expert(noise=0.0, control_hz=5)
+    expert = ScriptedExpert(noise=0.0, control_hz=5)
 
     def act(row):
       expert.begin(task, 0)
@@ -68,7 +68,7 @@ class MirrorTest(parameterized.TestCase):
 
   def test_the_simulator_shows_in_the_image_the_image_of_what_it_shows(self):
     environment = tasks.load("stack", seed=0)
-    expert = make_expert(noise=0.0)
+    expert = ScriptedExpert(noise=0.0)
     expert.begin("stack", 0)
     timestep = _begin(environment, 1)
     rows, actions = [], []

@@ -9,7 +9,7 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc import flatten, seeding, tasks
 from lfgp_dmc.task_names import ALL_TASKS
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.experts import POLICIES, make_expert
+from lfgp_dmc.tasks.experts import POLICIES, ScriptedExpert
 from lfgp_dmc.tasks.experts.view import look
 
 _STEPS = 360
@@ -23,7 +23,7 @@ def _environment(task):
 
 def _run(environment, task, timestep, seed=0):
   """Plays until success; returns (succeeded, actions)."""
-  expert = make_expert()
+  expert = ScriptedExpert()
   expert.begin(task, seed)
   actions = []
   for _ in range(_STEPS):
@@ -63,7 +63,7 @@ class ExpertTest(parameterized.TestCase):
     self, task, control_hz
   ):
     environment = tasks.load(task, seed=0, control_hz=control_hz)
-    expert = make_expert(control_hz=control_hz)
+    expert = ScriptedExpert(control_hz=control_hz)
     for i in range(2):
       environment.reseed(seeding.derive(3, "test", i))
       expert.begin(task, i)
@@ -77,12 +77,12 @@ class ExpertTest(parameterized.TestCase):
     environment = _environment(task)
     environment.reseed(11)
     timestep = environment.reset()
-    whole = make_expert(noise=0.0)
+    whole = ScriptedExpert(noise=0.0)
     whole.begin(task, 0)
     for step in range(120):
       observation = flatten(timestep.observation)
       action = whole.act(observation)
-      fresh = make_expert(noise=0.0)
+      fresh = ScriptedExpert(noise=0.0)
       fresh.begin(task, step + 1)
       np.testing.assert_array_equal(fresh.act(observation)[:3], action[:3])
       timestep = environment.step(action)
@@ -91,7 +91,7 @@ class ExpertTest(parameterized.TestCase):
     observation = flatten(_environment("reach").reset().observation)
     actions = []
     for seed in (1, 1, 2):
-      expert = make_expert()
+      expert = ScriptedExpert()
       expert.begin("reach", seed)
       actions.append(expert.act(observation))
     np.testing.assert_array_equal(actions[0], actions[1])
@@ -99,13 +99,13 @@ class ExpertTest(parameterized.TestCase):
 
   def test_unknown_task_and_noise_list_the_valid_ones(self):
     with self.assertRaisesRegex(ValueError, "'fly'; valid tasks: stack, "):
-      make_expert().begin("fly", 0)
+      ScriptedExpert().begin("fly", 0)
     with self.assertRaisesRegex(ValueError, "valid is 0 or more"):
-      make_expert(noise=-0.1)
+      ScriptedExpert(noise=-0.1)
     self.assertEqual(tuple(POLICIES), ALL_TASKS)
 
   def test_the_factory_goes_to_workers(self):
-    make = pickle.loads(pickle.dumps(functools.partial(make_expert, 0.2)))
+    make = pickle.loads(pickle.dumps(functools.partial(ScriptedExpert, 0.2)))
     make().begin("lift", 0)
 
 
