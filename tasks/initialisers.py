@@ -47,13 +47,7 @@ def place_all(
 ) -> None:
   """Puts arm, set-point and blocks where an episode starts.
 
-  Args:
-    physics: the compiled world.
-    random_state: what is sampled is drawn from it.
-    world: whose bodies are placed.
-    spawn: the option of `tasks.load`.
-    start: how a sampled green lies to blue.
-    request: what is not sampled.
+  `spawn` and `start` say how to sample what `request` leaves open.
 
   Raises:
     ValueError: the arm cannot reach the requested TCP.

@@ -7,13 +7,13 @@ import numpy as np
 from dm_control import composer
 from dm_env import specs
 
+from lfgp_dmc.observations import components
 from lfgp_dmc.task_names import MAIN_TASKS
-from lfgp_dmc.tasks import control, initialisers
+from lfgp_dmc.tasks import control, initialisers, observables
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.arena import PlayArena
 from lfgp_dmc.tasks.goals import GOALS, terms
 from lfgp_dmc.tasks.holds import Holds
-from lfgp_dmc.tasks.observables import TaskObservables
 from lfgp_dmc.tasks.world import World
 
 _SETTLE_STEPS = 100
@@ -40,16 +40,7 @@ class PlayTask(composer.Task):
     control_hz: int,
     show_rewards: bool,
   ):
-    """Builds the world.
-
-    Args:
-      main_task: the task's name.
-      is_dense: whether the reward is the sum of the goal's dense terms.
-      has_camera: whether a camera is observed in place of privileged parts.
-      spawn: the option of `tasks.load`.
-      control_hz: control steps a second.
-      show_rewards: whether every goal's dense reward is observed.
-    """
+    """Builds the world; `tasks.load` describes and checks the options."""
     self._goal, self._is_dense, self._spawn = GOALS[main_task], is_dense, spawn
     self.world = World()
     self._holds = Holds(GOALS)
@@ -57,8 +48,13 @@ class PlayTask(composer.Task):
     self.request: initialisers.Request | None = None
     self.blocks_out = 0
     self.control_timestep = 1.0 / control_hz
-    self._observables = TaskObservables(
-      self.world.arena, self._read_reward, has_camera, show_rewards
+    self._published: dict[str, np.ndarray] = {}
+    self._observables = observables.make(
+      self._published,
+      self._read_reward,
+      self.world.arena,
+      has_camera,
+      show_rewards,
     )
 
   @property
@@ -69,7 +65,7 @@ class PlayTask(composer.Task):
   @property
   def task_observables(self) -> dict:
     """The observables by name, see `observables.py`."""
-    return self._observables.by_name
+    return self._observables
 
   # An episode.
 
@@ -163,20 +159,18 @@ class PlayTask(composer.Task):
     self.world.zones["green"].light(physics, self._snapshot.green)
 
   def _count_blocks_out(self) -> None:
-    is_out = list(
-      map(_is_out_of_tray, (self._snapshot.blue, self._snapshot.green))
-    )
+    blocks = self._snapshot.blue, self._snapshot.green
+    is_out = [_is_out_of_tray(block) for block in blocks]
     self.blocks_out += sum(map(operator.gt, is_out, self._is_out))
     self._is_out = is_out
 
   def _publish(self, physics) -> None:
-    features = self.world.reader.features(physics)
-    self._observables.publish_features(features)
+    self._published.update(components(self.world.reader.features(physics)))
     self._publish_flags()
 
   def _publish_flags(self) -> None:
-    self._observables.publish_flags(
-      self._holds.successes, self._conditions.values()
+    self._published.update(
+      observables.flags(self._holds.successes, self._conditions.values())
     )
 
   # Success and reward.

@@ -61,22 +61,26 @@ def reach(view: View) -> Command:
   return grasp.reach(view, view.blue, height=0.003)
 
 
+def _take_blue(view: View) -> Command | None:
+  """Frees and grasps blue; None: it is in hand."""
+  freeing = place.free_blue(view)
+  if freeing or is_held(view, view.blue):
+    return freeing
+  return grasp.grasp(view, view.blue)
+
+
 def lift(view: View) -> Command:
   """Grasps blue and takes it up."""
-  if freeing := place.free_blue(view):
-    return freeing
-  if not is_held(view, view.blue):
-    return grasp.grasp(view, view.blue)
+  if taking := _take_blue(view):
+    return taking
   goal = (view.tcp[0], view.tcp[1], _LIFT_Z)
   return Command(motion.servo(view, goal), CLOSE)
 
 
 def move_object(view: View) -> Command:
   """Grasps blue and carries it round a circle over the tray."""
-  if freeing := place.free_blue(view):
-    return freeing
-  if not is_held(view, view.blue):
-    return grasp.grasp(view, view.blue)
+  if taking := _take_blue(view):
+    return taking
   x, y = view.tcp[0] - _ORBIT[0], view.tcp[1] - _ORBIT[1]
   radius = max(math.hypot(x, y), 1e-6)
   # Along the circle, corrected towards it; up while it is low.

@@ -22,6 +22,7 @@ _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
 _MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
+_MOST_Y = 0.010  # m, likewise between the fingers
 _SWEPT = 0.10  # m from the middle along y, where a sweep outwards ends
 _SWEPT_BACK = 0.06  # m likewise, where a sweep inwards ends
 _AT_FINGER = 0.012  # m, TCP beside a block that is at one finger
@@ -29,15 +30,8 @@ _ASKEW = math.radians(1.4)
 _OPENING = 0.02  # change of the opening in a step of fingers that open
 
 
-def _room(
-  view: View, target: BlockView, most_y: float
-) -> tuple[float, float] | None:
+def _room(view: View, target: BlockView) -> tuple[float, float] | None:
   """How far to grip beside the target's centre, so that the fingers fit.
-
-  Args:
-    view: the observation.
-    target: the block to grip.
-    most_y: largest offset along y, m.
 
   Returns:
     The TCP's offset from the block along x and y, m; None: the other block
@@ -52,14 +46,11 @@ def _room(
   over_y = _FINGER_OUTSIDE + other.half - abs(dy)
   if over_x <= 0 or over_y <= 0:
     return (0.0, 0.0)
-  most_y = min(most_y, _FINGER_INSIDE - target.half - 0.003)
-  if over_y <= most_y and over_y <= over_x:
-    return (0.0, -side_y * over_y)
-  if over_x <= _MOST_X:
+  fits_x = over_x <= _MOST_X
+  fits_y = over_y <= min(_MOST_Y, _FINGER_INSIDE - target.half - 0.003)
+  if fits_x and not (fits_y and over_y <= over_x):
     return (-side_x * over_x, 0.0)
-  if over_y <= most_y:
-    return (0.0, -side_y * over_y)
-  return None
+  return (0.0, -side_y * over_y) if fits_y else None
 
 
 def hover_height(view: View) -> float:
@@ -68,13 +59,10 @@ def hover_height(view: View) -> float:
 
 
 def reach(
-  view: View,
-  target: BlockView,
-  height: float = GRIP_HEIGHT,
-  most_y: float = 0.010,
+  view: View, target: BlockView, height: float = GRIP_HEIGHT
 ) -> Command:
   """Brings the open fingers around a block, pushing it free if need be."""
-  offset = _room(view, target, most_y)
+  offset = _room(view, target)
   if is_between_fingers(view, target) and view.opening > 0.7:
     offset = offset or (0.0, 0.0)
   elif offset is None:
@@ -91,11 +79,8 @@ def reach(
 def grasp(view: View, target: BlockView, square: bool = False) -> Command:
   """Reaches a block and closes the fingers on it.
 
-  Args:
-    view: the observation.
-    target: the block.
-    square: whether to turn it parallel to the fingers first: closing alone
-      aligns a block to 10 degrees, and not at all beyond 35.
+  `square` turns it parallel to the fingers first: closing alone aligns a block
+  to 10 degrees, and not at all beyond 35.
   """
   square = square and target.tilt < 0.1
   is_letting_go = view.opening_rate > _OPENING
@@ -116,13 +101,11 @@ def _low(target: BlockView, height: float = GRIP_HEIGHT) -> float:
 
 def _is_centred(view: View, target: BlockView) -> bool:
   """In the middle of the gap; less strictly once the fingers are closing."""
-  dx, dy, dz = across(view, target)
   if view.opening < 0.92:
     return True
-  offset = _room(view, target, 0.010) or (0.0, 0.0)
-  return (
-    abs(dx - offset[0]) < 0.006 and abs(dy - offset[1]) < 0.006 and dz < 0.015
-  )
+  dx, dy, dz = across(view, target)
+  x, y = _room(view, target) or (0.0, 0.0)
+  return abs(dx - x) < 0.006 and abs(dy - y) < 0.006 and dz < 0.015
 
 
 def _sweep(view: View, target: BlockView, side: float) -> Command:

@@ -22,18 +22,13 @@ _LEAVE = 0.065  # m, TCP above a block that was let go
 
 
 def carry(
-  view: View,
-  block: BlockView,
-  spot: Vector,
-  narrow: float = 0.006,
-  slope: float = 2.5,
-  gain: float = 0.4,
+  view: View, block: BlockView, spot: Vector, **funnel: float
 ) -> Vector:
-  """Moves a held block's centre to `spot`, from above; the action's dx..dz."""
+  """Moves a held block's centre to `spot`; `funnel` is `from_above`'s."""
   dx, dy, dz = across(view, block)
   goal = (spot[0] + dx, spot[1] + dy, spot[2] + dz)
   hover = max(view.other(block).z + _CARRY, spot[2] + 0.02) + dz
-  return motion.from_above(view, goal, hover, narrow, slope, gain=gain)
+  return motion.from_above(view, goal, hover, **funnel)
 
 
 def set_down(
