@@ -47,13 +47,16 @@ class PlayArena(composer.Arena):
       contype=0,
       conaffinity=0,
     )
-    self._add_cameras(root)
+    for name, eye, target, fovy in _CAMERAS:
+      root.worldbody.add(
+        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
+      )
 
   def _set_physics(self, root) -> None:
-    # Line-search iterations below the default let blocks fly off, and
-    # pyramidal cones let a grasp slip. So do the implicit integrators (5 mm in
-    # 10 s of moves, against 1 mm): the contact forces are solved before the
-    # servos' damping is, so that hand and block part a little at each start.
+    # Fewer line-search iterations let blocks fly off, and pyramidal cones let a
+    # grasp slip. So do the implicit integrators (5 mm in 10 s of moves, not
+    # 1 mm): they solve contact forces before the servos' damping, and hand and
+    # block part a little at each start.
     root.option.timestep = _PHYSICS_STEP
     root.option.gravity = (0, 0, -9.81)  # m/s^2
     root.option.integrator = "Euler"
@@ -91,12 +94,6 @@ class PlayArena(composer.Arena):
         specular=[specular] * 3,
         castshadow=castshadow,
         directional=False,
-      )
-
-  def _add_cameras(self, root) -> None:
-    for name, eye, target, fovy in _CAMERAS:
-      root.worldbody.add(
-        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
       )
 
 

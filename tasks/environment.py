@@ -121,11 +121,11 @@ class PlayEnvironment(composer.Environment):
     return self.reset()
 
   def reseed(self, seed: int) -> None:
-    """Makes the next reset, and what follows, depend on `seed` alone."""
+    """Makes the next reset and all that follows depend on `seed` alone."""
     self._random_state.seed(seed)
 
   def clear_success(self) -> None:
-    """Restarts every hold and latch (play-based collection)."""
+    """Restarts every hold and latch, as play-based collection needs."""
     self._task.clear_success()
 
   def step(self, action) -> dm_env.TimeStep:

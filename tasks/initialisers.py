@@ -23,18 +23,12 @@ _IK_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Request:
-  """What a reset must start with; None is sampled.
+  """What a reset must start with; None is sampled."""
 
-  Attributes:
-    tcp: [3], m.
-    blue, green: [7], m and quaternion w x y z.
-    fingers: opening, 0..1; None is open.
-  """
-
-  tcp: np.ndarray | None = None
-  blue: np.ndarray | None = None
+  tcp: np.ndarray | None = None  # [3], m
+  blue: np.ndarray | None = None  # [7], m and quaternion w x y z
   green: np.ndarray | None = None
-  fingers: float | None = None
+  fingers: float | None = None  # opening, 0..1; None is open
 
 
 def place_all(

@@ -17,6 +17,9 @@ from lfgp_dmc.tasks.goals import GOALS
 
 _CAMERA = "camera/" + FRONT_CAMERA
 _FLAGS = [p + n for p in (SUCCESS_PREFIX, CONDITION_PREFIX) for n in GOALS]
+_VALUES = (np.array(False), np.array(True))
+for _value in _VALUES:
+  _value.setflags(write=False)  # handed out as they are
 
 
 def make(
@@ -63,5 +66,5 @@ def flags(
   successes: Iterable[bool], conditions: Iterable[bool]
 ) -> dict[str, np.ndarray]:
   """What to publish of the goals: one of each, in their order."""
-  values = map(np.array, (*successes, *conditions))
+  values = map(_VALUES.__getitem__, (*successes, *conditions))
   return dict(zip(_FLAGS, values, strict=True))

@@ -15,17 +15,11 @@ _TOP = 0.285  # m, highest set-point
 
 
 class Command(NamedTuple):
-  """What an expert wants, before noise.
+  """An expert's decision, before noise."""
 
-  Attributes:
-    move: dx, dy, dz of the action.
-    grip: OPEN or CLOSE.
-    noise: factor on the action noise: below 1 where precision is needed.
-  """
-
-  move: Vector
-  grip: int
-  noise: float = 1.0
+  move: Vector  # dx, dy, dz of the action
+  grip: int  # OPEN or CLOSE
+  noise: float = 1.0  # factor on the action noise: below 1 for precision
 
 
 def clip(value: float, low: float, high: float) -> float:

@@ -15,19 +15,13 @@ _GRIP = (0.40, 0.80)
 
 @dataclass(slots=True)
 class BlockView:
-  """A block; lengths in m, angles in rad.
+  """A block; lengths in m, angles in rad."""
 
-  Attributes:
-    x, y, z: its centre.
-    yaw: turn about z away from the axes, within +-45 degrees.
-    tilt: angle between its most upright side and the vertical.
-  """
-
-  x: float
+  x: float  # of its centre
   y: float
   z: float
-  yaw: float
-  tilt: float
+  yaw: float  # turn about z away from the axes, within +-45 degrees
+  tilt: float  # angle between its most upright side and the vertical
 
   @property
   def half(self) -> float:
@@ -37,21 +31,12 @@ class BlockView:
 
 @dataclass(slots=True)
 class View:
-  """One observation.
+  """One observation; lengths in m."""
 
-  Attributes:
-    tcp: tool centre point, m.
-    set_point: where the TCP is heading: the set-point, by the TCP's lag, m.
-    opening: mean opening of the fingers, 0 closed to 1 open.
-    opening_rate: its change over the last step, > 0 when the fingers open.
-    blue, green: the blocks.
-    control_hz: control steps a second.
-  """
-
-  tcp: Vector
-  set_point: Vector
-  opening: float
-  opening_rate: float
+  tcp: Vector  # tool centre point
+  set_point: Vector  # estimated from the TCP's velocity and its lag
+  opening: float  # mean of the fingers, 0 closed to 1 open
+  opening_rate: float  # its change over the last step, > 0 when they open
   blue: BlockView
   green: BlockView
   control_hz: int = 20

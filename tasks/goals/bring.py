@@ -3,7 +3,6 @@
 import functools
 import math
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
@@ -16,16 +15,14 @@ _BRING_GOAL = (*ws.BLUE_XY, ws.FLAT_Z)  # a flat block in the zone
 
 
 def is_let_go(state: Snapshot, radius: float) -> bool:
-  """Blue lies on the tray within `radius` of p_s, m, and is not held."""
-  return (
-    predicates.is_released_on_tray(state)
-    and math.dist(state.blue, ws.BLUE_SLOT) < radius
-  )
+  """Blue touches the tray and not the robot, within `radius` of p_s, m."""
+  is_near = math.dist(state.blue, ws.BLUE_SLOT) < radius
+  return state.blue_on_tray and not state.blue_on_robot and is_near
 
 
 def dense_terms(state: Snapshot, goal, threshold: float) -> Terms:
   """Closeness of blue to `goal`, full within the threshold, m; then retreat."""
-  is_near = predicates.distance(state) <= predicates.NEAR
+  is_near = state.distance <= terms.NEAR
   is_done = math.dist(state.blue, goal) < _DONE
   is_opening = state.action[3] < 0.0
   return {

@@ -3,31 +3,33 @@
 import functools
 import math
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
 _OPEN, _CLOSE = -1.0, 1.0  # signs of a_g
+_SLOW = 0.08  # m/s, TCP
 
 
 def is_commanded(state: Snapshot, sign: float) -> bool:
   """a_g of that sign, a block within 10 cm, the TCP slower than 8 cm/s."""
-  return (
-    sign * state.action[3] > 0.0
-    and predicates.is_slow(state)
-    and predicates.is_near_a_block(state)
-  )
+  is_slow = state.tcp_speed < _SLOW
+  return sign * state.action[3] > 0.0 and is_slow and _is_near_a_block(state)
 
 
 def dense_terms(state: Snapshot, sign: float) -> Terms:
   """1 for the command, less half the movement's size; near a block only."""
-  near = 1.0 if predicates.is_near_a_block(state) else 0.0
+  near = 1.0 if _is_near_a_block(state) else 0.0
   return {
     "command": near * float(sign * state.action[3] > 0.0),
     "movement": -0.5 * near * math.hypot(*state.action[:3]),
     "limits": terms.limits(state),
   }
+
+
+def _is_near_a_block(state: Snapshot) -> bool:
+  nearest = min(math.dist(state.tcp, xyz) for xyz in (state.blue, state.green))
+  return nearest <= terms.NEAR
 
 
 def _goal(name: str, sign: float) -> Goal:

@@ -6,7 +6,6 @@ the penalty for a green block that does not lie flat.
 
 import math
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import starts, terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
@@ -17,21 +16,19 @@ _PLACED = 0.005  # m
 
 def is_stacked(state: Snapshot) -> bool:
   """Blue touches green, and neither the tray nor the robot."""
-  return (
-    state.blue_on_green and not state.blue_on_tray and not state.blue_on_robot
-  )
+  return state.blue_on_green and not (state.blue_on_tray or state.blue_on_robot)
 
 
 def dense_terms(state: Snapshot) -> Terms:
   """The released code's terms, all zero beyond 10 cm of blue."""
-  if predicates.distance(state) > predicates.NEAR:
+  if state.distance > terms.NEAR:
     return dict.fromkeys(("place", "retreat", "lift", "grasp", "open"), 0.0)
   x, y, z = state.green
   goal = (x, y, z + _ABOVE_GREEN)
-  high = predicates.height(state)
+  high = state.height
   is_up = high > 0.035
   is_still = state.blue_speed < 0.01  # m/s
-  is_held = predicates.are_fingers_between(state, *terms.CLOSED_ON_BLOCK)
+  is_held = state.has_fingers_between(*terms.CLOSED_ON_BLOCK)
   is_placed = math.dist(state.blue, goal) < _PLACED
   return {
     "place": terms.closeness(_PLACED, state.blue, goal) if is_up else 0.0,
