@@ -1,4 +1,4 @@
-"""Who may touch whom, and with what friction: explicit pairs only.
+"""The contact pairs and their friction; no other geoms collide.
 
 MuJoCo would combine two geoms' frictions by their maximum; the released
 environment's simulator multiplies them, so every pair states its own.

@@ -18,9 +18,9 @@ from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL
 
 ACTION_SIZE = 4
 
-# Per axis, x y z: the arm's mass at the TCP differs between them, the response
-# wanted does not. Explicit integration (see arena.py) is stable while the
-# largest eigenvalue of timestep x mass^-1 x damping is below 2; it is 1.7.
+# Per axis, x y z, for equal responses despite unequal masses at the TCP.
+# Explicit integration (see arena.py) is stable while the largest eigenvalue of
+# timestep x mass^-1 x damping is below 2; it is 1.7.
 _POSITION_GAINS = (8000.0, 9800.0, 9000.0)  # N/m
 _POSITION_DAMPINGS = (760.0, 885.0, 835.0)  # N s/m
 _POSITION_FORCE = 150.0  # N

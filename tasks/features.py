@@ -18,7 +18,7 @@ from lfgp_dmc.tasks.snapshot import Snapshot
 
 _WRENCH_SCALE = np.array([100.0] * 3 + [10.0] * 3)  # N, N m
 
-# Bits of the contact table: who a geom belongs to.
+# Bits of the contact table: the owner of a geom.
 _BLUE, _GREEN, _TRAY, _ROBOT = 1, 2, 4, 8
 
 
@@ -160,7 +160,7 @@ class FeatureReader:
     self._matrix, self._offset = matrix, offset
 
   def _force_torque(self, physics, sensed) -> np.ndarray:
-    """Tanh of what the wrist carries beyond its own hand, float [6]."""
+    """Tanh of the wrist's load apart from the hand, float [6]."""
     frame = physics.data.ptr.site_xmat[self._wrist_id, 6:9].tolist()
     # The sensor reads what holds the hand up: minus the weight, in its frame.
     a, b, c = (self._weight * axis for axis in frame)

@@ -65,7 +65,7 @@ class BlockEnvironment(DmControlCompatibilityV0):
   def reset(
     self, *, seed: int | None = None, options: dict[str, Any] | None = None
   ) -> tuple[Any, dict[str, Any]]:
-    """Starts an episode; `options` may name the starts of `reset_to`."""
+    """Starts an episode; `options` are the arguments of `reset_to`."""
     gymnasium.Env.reset(self, seed=seed)
     if seed is not None:
       self._env.reseed(seed)

@@ -23,7 +23,7 @@ _IK_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Request:
-  """What a reset must start with; None is sampled."""
+  """A requested start state; None is sampled."""
 
   tcp: np.ndarray | None = None  # [3], m
   blue: np.ndarray | None = None  # [7], m and quaternion w x y z
@@ -79,7 +79,7 @@ def _place_arm(physics, panda: Panda, tcp, fingers: float) -> None:
 
 
 def _sample_tcp(random_state, spawn: str) -> np.ndarray:
-  """5 to 14.5 cm above the floor, float [3], m."""
+  """A TCP 5 to 14.5 cm above the floor, float [3], m."""
   half = ws.FLOOR_HALF if spawn == "full_tray" else ws.SPAWN_HALF
   (x, y), heights = ws.CENTRE_XY, ws.TCP_START_Z
   ranges = ((x - half, x + half), (y - half, y + half), heights)

@@ -14,27 +14,27 @@ from lfgp_dmc.observations import OBSERVATION_SIZE, OBSERVATION_SLICES
 from lfgp_dmc.tasks import workspace as ws
 
 # Signs by component. A reflection flips one axis of a vector, and the other two
-# of what turns: rotations, angular velocities, torques.
+# of a pseudovector: rotation axes, angular velocities, torques.
 _VECTOR = (1, -1, 1)
-_TURNING = (-1, 1, -1)
+_PSEUDO = (-1, 1, -1)
 _SIGNS: dict[str, tuple[int, ...]] = {
   "ee_position": _VECTOR,
   "ee_velocity": _VECTOR,
   "finger_positions": (1,) * 6,
   "block_positions": _VECTOR * 2,
-  "block_rotations": (1, *_TURNING) * 2,
+  "block_rotations": (1, *_PSEUDO) * 2,
   "block_linear_velocities": _VECTOR * 2,
-  "block_angular_velocities": _TURNING * 2,
+  "block_angular_velocities": _PSEUDO * 2,
   "blocks_from_ee": _VECTOR * 2,
   "green_from_blue": _VECTOR,
   "slots_from_blocks": _VECTOR * 2,
-  "force_torque": (*_VECTOR, *_TURNING),  # the hand's y is the world's, or -y
+  "force_torque": (*_VECTOR, *_PSEUDO),  # the hand's y is the world's, or -y
 }
 _POSITIONS = ("ee_position", "block_positions")  # whose y is not an offset
 
 
 def _columns(name: str) -> np.ndarray:
-  """Where in the 59 a component's floats are."""
+  """A component's places in the 59."""
   return np.r_[OBSERVATION_SLICES[name].slices]
 
 

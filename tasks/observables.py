@@ -19,7 +19,7 @@ _CAMERA = "camera/" + FRONT_CAMERA
 _FLAGS = [p + n for p in (SUCCESS_PREFIX, CONDITION_PREFIX) for n in GOALS]
 _VALUES = (np.array(False), np.array(True))
 for _value in _VALUES:
-  _value.setflags(write=False)  # handed out as they are
+  _value.setflags(write=False)  # handed out without a copy
 
 
 def make(
@@ -65,6 +65,6 @@ def _published(published, name: str) -> observable.Observable:
 def flags(
   successes: Iterable[bool], conditions: Iterable[bool]
 ) -> dict[str, np.ndarray]:
-  """What to publish of the goals: one of each, in their order."""
+  """Values of the flags by name; one of each a goal, in their order."""
   values = map(_VALUES.__getitem__, (*successes, *conditions))
   return dict(zip(_FLAGS, values, strict=True))

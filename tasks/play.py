@@ -26,8 +26,8 @@ class PlayTask(composer.Task):
 
   Attributes:
     world: the entities, the control and the reader.
-    blocks_out: how often a block left the tray, over all episodes.
-    request: where the next reset, and it alone, must start; None is sampled.
+    blocks_out: times that a block left the tray, over all episodes.
+    request: the start state of the next reset only; None is sampled.
   """
 
   def __init__(

@@ -1,16 +1,16 @@
-"""What the play world's bodies have in common."""
+"""The base of the play world's entities."""
 
 from dm_control import composer, mjcf
 
 
 class Body(composer.Entity):
-  """An entity whose geoms touch nothing but what `contacts.py` pairs them with.
+  """An entity whose only contacts are the pairs of `contacts.py`.
 
   Attributes:
     mjcf_model: its own MJCF tree.
   """
 
-  mjcf_model: mjcf.RootElement = None  # Composer wants the name in the class
+  mjcf_model: mjcf.RootElement = None  # abstract in Composer
 
   def _start_model(self, name: str) -> mjcf.RootElement:
     self.mjcf_model = mjcf.RootElement(model=name)

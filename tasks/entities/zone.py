@@ -38,7 +38,7 @@ class Zone(Body):
     """Lights up while `block`, the centre in m, is in the zone; else dims."""
     gap = max(abs(block[0] - self._xy[0]), abs(block[1] - self._xy[1]))
     is_lit = gap < ws.ZONE_HALF and block[2] < ws.FLAT_Z + ws.BLOCK_HALF
-    if is_lit != self.is_lit:  # else it costs nothing
+    if is_lit != self.is_lit:  # binding takes time
       self.is_lit = is_lit
       material = physics.bind(self._material)
       material.rgba = self._colours[is_lit]

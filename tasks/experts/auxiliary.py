@@ -17,7 +17,7 @@ _LIFT_Z = 0.272  # m, of the TCP
 _ORBIT = (0.0, 0.5, 0.235)  # m, centre of Move-Object's circle
 _ORBIT_RADIUS = 0.06  # m
 _ORBIT_SPEED = 0.62
-_RESTLESS = 5.0  # the gripper tasks hover more loosely than a grasp moves
+_RESTLESS = 5.0  # noise factor of the gripper tasks, which need no precision
 
 
 def open_gripper(view: View) -> Command:

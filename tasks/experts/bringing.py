@@ -7,10 +7,10 @@ from lfgp_dmc.tasks.experts import grasp, motion, place
 from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
 from lfgp_dmc.tasks.experts.view import BlockView, View, across, is_held
 
-_BROUGHT = 0.026  # m, horizontally, of a block that may stay
-_DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
-_IN_MOUTH_Z = ws.INSERTED_Z + 0.0045  # m, of an upright block that will drop
-_IN_SLOT_Z = ws.INSERTED_Z + 0.003  # m, of any block that will drop in
+_BROUGHT = 0.026  # m, horizontal error of a block that may stay
+_DODGE = 0.019  # m, largest shift of blue beside the slot in Bring
+_IN_MOUTH_Z = ws.INSERTED_Z + 0.0045  # m, an upright block below it drops in
+_IN_SLOT_Z = ws.INSERTED_Z + 0.003  # m, any block below it drops in
 _SEATED_Z = ws.INSERTED_Z + 0.002  # m
 _TILTED = math.radians(3.0)
 _JAMMED = math.radians(3.8)

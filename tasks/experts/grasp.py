@@ -1,4 +1,4 @@
-"""Getting hold of a block: room for the fingers, alignment, closing.
+"""Grasping a block: room for the fingers, alignment, closing.
 
 The fingers close along y and leave a gap of 8 cm when open.
 """
@@ -21,21 +21,20 @@ HOVER = 0.050  # m, TCP above the centre of the highest block on the way
 _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
-_MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
+_MOST_X = 0.009  # m, largest offset of a gripped block from the pads' middle
 _MOST_Y = 0.010  # m, likewise between the fingers
 _SWEPT = 0.10  # m from the middle along y, where a sweep outwards ends
 _SWEPT_BACK = 0.06  # m likewise, where a sweep inwards ends
-_AT_FINGER = 0.012  # m, TCP beside a block that is at one finger
+_AT_FINGER = 0.012  # m, TCP to a block at one finger
 _ASKEW = math.radians(1.4)
-_OPENING = 0.02  # change of the opening in a step of fingers that open
+_OPENING = 0.02  # change of the opening in a step while fingers open
 
 
 def _room(view: View, target: BlockView) -> tuple[float, float] | None:
-  """How far to grip beside the target's centre, so that the fingers fit.
+  """Offset of the grip from the target's centre at which the fingers fit.
 
   Returns:
-    The TCP's offset from the block along x and y, m; None: the other block
-    leaves no room.
+    Along x and y, m; None if the other block leaves no room.
   """
   other = view.other(target)
   if abs(other.z - target.z) > 0.030:
@@ -115,7 +114,7 @@ def _sweep(view: View, target: BlockView, side: float) -> Command:
 
 
 def _sweeping_side(view: View, target: BlockView) -> float:
-  """Which way along y to sweep a block; 0: it is where sweeps end.
+  """Direction along y of a sweep; 0 where sweeps end.
 
   The block's place decides, which is easier to observe and to imitate than a
   degree of yaw: outwards until it is 10 cm from the middle. Only a block that

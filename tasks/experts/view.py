@@ -1,4 +1,4 @@
-"""What a scripted expert sees: the 59 floats, by name, and nothing else."""
+"""A scripted expert's view of the 59 floats, by name."""
 
 import math
 from dataclasses import dataclass

@@ -18,10 +18,10 @@ class Goal:
     condition: the success condition at one instant (appendix "Evaluation" of
       the paper; numbers of the released code).
     dense_terms: named terms of the dense reward, whose sum is the reward.
-    is_penalised_off_tray: whether the reward falls while green does not lie
-      flat, in episodes with such a penalty (`BlockStart.penalises_green`).
+    is_penalised_off_tray: whether the penalty for a green block that does not
+      lie flat applies, in episodes with one (`BlockStart.penalises_green`).
     hold_checks: consecutive 50 ms checks before the condition is a success.
-    start: where the blocks are when an episode of this task starts.
+    start: the blocks' arrangement at the start of this task's episodes.
   """
 
   name: str

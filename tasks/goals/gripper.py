@@ -18,7 +18,7 @@ def is_commanded(state: Snapshot, sign: float) -> bool:
 
 
 def dense_terms(state: Snapshot, sign: float) -> Terms:
-  """1 for the command, less half the movement's size; near a block only."""
+  """1 for the command minus half the movement's size, near a block only."""
   near = 1.0 if _is_near_a_block(state) else 0.0
   return {
     "command": near * float(sign * state.action[3] > 0.0),

@@ -15,7 +15,7 @@ def is_moving(state: Snapshot) -> bool:
 
 
 def dense_terms(state: Snapshot) -> Terms:
-  """Speed, less jerking, at the block; a bonus near it and for lifting."""
+  """Speed minus jerks at the block; bonuses near it and for carrying it."""
   at_block = 1.0 if state.distance < _AT_BLOCK else 0.0
   is_carried = (
     state.has_fingers_between(*terms.CLOSED_ON_BLOCK) and state.height > 0.005

@@ -1,4 +1,4 @@
-"""How the blocks lie when an episode starts; each goal owns one of these."""
+"""Arrangements of the blocks at an episode's start; every goal has one."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -11,13 +11,13 @@ from lfgp_dmc.tasks.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class BlockStart:
-  """Where green starts, given where blue does.
+  """One arrangement.
 
   Attributes:
     place_green: green's pose from blue's and from one sampled on the floor,
       float [7] each.
-    is_settled: whether blocks that have come to rest lie so.
-    penalises_green: whether the dense rewards of goals that care about it fall
+    is_settled: whether the blocks, come to rest, are arranged so.
+    penalises_green: whether goals with `is_penalised_off_tray` lose reward
       while green does not lie flat.
   """
 

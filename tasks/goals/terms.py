@@ -1,4 +1,4 @@
-"""Parts that several dense rewards share (released code, SAC-X experts)."""
+"""Terms shared by several dense rewards (released code, SAC-X experts)."""
 
 import math
 
@@ -35,7 +35,7 @@ def near_bonus(state: Snapshot) -> float:
 
 
 def is_grasp_rising(state: Snapshot) -> bool:
-  """Closed on blue at a tight reach, and moving up or already up."""
+  """Fingers closed on blue, the TCP at its centre, moving up or already up."""
   return (
     state.distance < _TIGHT
     and state.has_fingers_between(*CLOSED_ON_BLOCK)
