@@ -10,7 +10,7 @@ Episodes are truncated at their time limit and never terminate: success does not
 end them. After `reset(seed=...)` everything depends on the seed alone.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -31,7 +31,7 @@ _FIXED_RENDERING = {"height": 480, "width": 640, "camera_id": "three_quarter"}
 class BlockEnvironment(DmControlCompatibilityV0):
   """A Composer environment of this project for Gymnasium."""
 
-  metadata: ClassVar[dict[str, Any]] = {
+  metadata = gymnasium.Env.metadata | {
     "render_modes": ["rgb_array", "depth_array"],
     "render_fps": 20,
   }
