@@ -43,7 +43,7 @@ def scripted_expert(control_hz: int = 20) -> Actor:
   """Makes the scripted expert of all nine tasks."""
   from lfgp_dmc.tasks import experts
 
-  return experts.make_expert(control_hz=control_hz)
+  return experts.ScriptedExpert(control_hz=control_hz)
 
 
 def stored_policy(folder: str) -> Actor:

@@ -52,7 +52,7 @@ def load(
     seed: fixes everything random in the environment; None draws a fresh seed.
     **options: `reward` ("sparse" or "dense"), `observations` ("features" or
       "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20),
-      `time_limit` (18.0 s); see `tasks.load`.
+      `time_limit` (18.0 s), `show_rewards` (False); see `tasks.load`.
 
   Returns:
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.

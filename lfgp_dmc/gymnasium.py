@@ -16,7 +16,7 @@ import gymnasium
 from lfgp_dmc.task_names import ALL_TASKS
 
 NAMESPACE = "lfgp_dmc"
-_MAKE = "lfgp_dmc.tasks.gymnasium_environment:make"
+_MAKE = "lfgp_dmc.tasks.gymnasium_environment:BlockEnvironment"
 
 
 def environment_id(task: str) -> str:

@@ -56,6 +56,7 @@ OBSERVATION_SLICES: dict[str, Component] = {
 
 SUCCESS_PREFIX = "success/"
 CONDITION_PREFIX = "condition/"
+REWARD_PREFIX = "reward/"  # of a task; see `acting/environments.py`
 
 
 # The components one after the other: where each starts and ends, where in the

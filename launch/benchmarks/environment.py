@@ -58,7 +58,7 @@ def _physics_alone(environment, steps: int, seed: int) -> float:
 
   from lfgp_dmc.tasks import experts
 
-  expert = experts.make_expert()
+  expert = experts.ScriptedExpert()
   model, data = environment.physics.model.ptr, environment.physics.data.ptr
   signature = mujoco.mjtState.mjSTATE_INTEGRATION
   state = np.empty(mujoco.mj_stateSize(model, signature))

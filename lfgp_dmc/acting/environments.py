@@ -13,11 +13,10 @@ import numpy as np
 
 from lfgp_dmc import observations
 
-REWARD_PREFIX = "reward/"
-_TASK_PREFIXES = (
+TASK_PREFIXES = (
   observations.SUCCESS_PREFIX,
   observations.CONDITION_PREFIX,
-  REWARD_PREFIX,
+  observations.REWARD_PREFIX,
 )
 
 Flattener = Callable[[Any], np.ndarray]
@@ -37,7 +36,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   names = [
     name
     for name, part in spec.items()
-    if not name.startswith(_TASK_PREFIXES)
+    if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
   if not names:
@@ -82,7 +81,9 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
   shown = timestep.observation
   if not isinstance(shown, Mapping):
     shown = {}
-  rewards = [float(shown.get(REWARD_PREFIX + task, own)) for task in tasks]
+  rewards = [
+    float(shown.get(observations.REWARD_PREFIX + task, own)) for task in tasks
+  ]
   return np.asarray(rewards, np.float32)
 
 
@@ -96,9 +97,9 @@ def tasks_with_rewards(
   spec = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
   shown = [
-    name.removeprefix(REWARD_PREFIX)
+    name.removeprefix(observations.REWARD_PREFIX)
     for name in names
-    if name.startswith(REWARD_PREFIX)
+    if name.startswith(observations.REWARD_PREFIX)
   ]
   return (*tasks, *(task for task in shown if task not in tasks))
 

@@ -164,7 +164,7 @@ class CollectTest(parameterized.TestCase):
   def test_workers_change_nothing(self, kind):
     plan = CollectionPlan(
       lfgp_dmc.load,
-      experts.make_expert,
+      experts.ScriptedExpert,
       "stack",
       lfgp_dmc.task_set("stack"),
       seed=1,
