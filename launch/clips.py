@@ -8,6 +8,7 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics, seeding
+from lfgp_dmc.acting import environments
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.pictures import recorder, task_switch
 from lfgp_dmc.runs import checkpoints, run_folder
@@ -16,7 +17,7 @@ SCHEDULED = "scheduled"
 
 
 class Stage:
-  """A spec in its environment; each clip depends on its seed alone."""
+  """A policy in its environment; each clip depends on its seed alone."""
 
   def __init__(
     self,
@@ -56,13 +57,12 @@ class Stage:
     Raises:
       UserError: there is no scheduler to choose by.
     """
-    environment: Any = self._environment
-    derived = seeding.derive(seed, "clip")
-    if hasattr(environment, "reseed"):
-      environment.reseed(derived)
-    else:
-      environment.close()
-      self._environment = environment = self._spec.world.build(seed=derived)
+    environment: Any = environments.reseeded(
+      self._environment,
+      self._spec.world.factory(),
+      seeding.derive(seed, "clip"),
+    )
+    self._environment = environment
     switch = task_switch.one_task(self._task)
     if self._is_play:
       tasks = lfgp_dmc.task_set(self._spec.main_task)

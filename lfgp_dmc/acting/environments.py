@@ -52,6 +52,22 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   return flatten
 
 
+def reseeded(
+  environment: dm_env.Environment,
+  make_environment: Callable[..., dm_env.Environment],
+  seed: int,
+) -> dm_env.Environment:
+  """The environment whose next reset depends on `seed` alone.
+
+  It is the same one if it has a `reseed`, or else a new one of `seed=`.
+  """
+  if hasattr(environment, "reseed"):
+    environment.reseed(seed)
+    return environment
+  environment.close()
+  return make_environment(seed=seed)
+
+
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
   """The sizes (O, A) of flat observations and of actions."""
   spec = environment.observation_spec()

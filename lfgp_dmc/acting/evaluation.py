@@ -6,9 +6,7 @@ the episodes before it, or the number of processes.
 
 import contextlib
 import functools
-import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import dm_env
 import tqdm
@@ -35,8 +33,7 @@ def evaluate(
 
   Args:
     make_environment: builds the main task's environment, which observes
-      `reward/<task>` if it can. One without `reseed` is built anew each
-      episode, with `seed=` if the factory takes it.
+      `reward/<task>` if it can; see `environments.reseeded`.
     make_actor: builds the actor. With several workers both must be picklable.
     tasks: the intentions to evaluate.
     episodes: episodes a task.
@@ -79,7 +76,11 @@ class _Player:
   def __call__(self, job: tuple[str, int]) -> EvaluationRow:
     """Plays one whole episode; success never ends it."""
     task, episode = job
-    self._prepare(seeding.derive(self._seed, "evaluation", episode))
+    self._environment = environments.reseeded(
+      self._environment,
+      self._make_environment,
+      seeding.derive(self._seed, "evaluation", episode),
+    )
     self._actor.begin(task, seeding.derive(self._seed, "actor", task, episode))
     timestep = self._environment.reset()
     steps, total, first = 0, 0.0, None
@@ -107,17 +108,3 @@ class _Player:
   def close(self) -> None:
     """Frees the environment."""
     self._environment.close()
-
-  def _prepare(self, seed: int) -> None:
-    if hasattr(self._environment, "reseed"):
-      self._environment.reseed(seed)
-    elif _takes_seed(self._make_environment):
-      self._environment.close()
-      self._environment = self._make_environment(seed=seed)
-
-
-def _takes_seed(factory: Callable[..., Any]) -> bool:
-  try:
-    return "seed" in inspect.signature(factory).parameters
-  except (TypeError, ValueError):  # a builtin without a signature
-    return False
