@@ -18,17 +18,14 @@ goes into a JSON file beside it.
 
 import pathlib
 import re
-from typing import Any
+from collections.abc import Sequence
 
-import numpy as np
 from absl import flags
 
 import lfgp_dmc
-from lfgp_dmc import graphics, seeding
-from lfgp_dmc.launch import command, film_strips, policies, task_switch
+from lfgp_dmc.launch import clips, command, policies
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.launch.environment_spec import World
-from lfgp_dmc.pictures import recorder, video
+from lfgp_dmc.pictures import film_strips, recorder, task_switch, video
 from lfgp_dmc.task_names import CONTROL_RATES
 
 _RUN = flags.DEFINE_string(
@@ -45,31 +42,20 @@ _TASK = flags.DEFINE_string(
   "task", "", "The intention, or scheduled; default: the main task."
 )
 _COLLECTION = flags.DEFINE_enum(
-  "collection",
-  "reset",
-  ["reset", "play"],
-  "play: the expert goes from task to task without a reset.",
+  "collection", "reset", ["reset", "play"], "play: task after task, no reset."
 )
 _OUTPUT = flags.DEFINE_string(
   "output", "", ".mp4, .gif or .png; default: videos/NAME_TASK.mp4."
 )
 _GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
-_SEED = flags.DEFINE_integer(
-  "seed", 0, "Of the (first) reset and the actor.", lower_bound=0
-)
+_SEED = flags.DEFINE_integer("seed", 0, "Of the (first) reset.", lower_bound=0)
 _CAMERA = flags.DEFINE_string("camera", "three_quarter", "The camera's name.")
-_HEIGHT = flags.DEFINE_integer(
-  "height", 480, "Pixels, of the whole grid.", lower_bound=32
-)
-_WIDTH = flags.DEFINE_integer(
-  "width", 640, "Pixels, of the whole grid.", lower_bound=32
-)
+_HEIGHT = flags.DEFINE_integer("height", 480, "In pixels.", lower_bound=32)
+_WIDTH = flags.DEFINE_integer("width", 640, "In pixels.", lower_bound=32)
 _SHADOWS = flags.DEFINE_bool(
   "shadows", True, "Shadows and smooth edges; without, 3 times as fast."
 )
-_EVERY = flags.DEFINE_integer(
-  "every", 1, "50 ms a frame: control steps at 20 Hz.", lower_bound=1
-)
+_EVERY = flags.DEFINE_integer("every", 1, "50 ms a frame.", lower_bound=1)
 _STEPS = flags.DEFINE_integer(
   "steps", 0, "Control steps at most; 0: the whole episode.", lower_bound=0
 )
@@ -85,7 +71,6 @@ _UNTIL = flags.DEFINE_bool(
 )
 
 _MOST_CELLS = 100
-
 _RATE = 20.0  # 50 ms a second
 
 
@@ -93,149 +78,119 @@ def main() -> None:
   """Plays, renders and writes."""
   rows, columns = _grid()
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
-  task = _TASK.value
-  if task and (_EXPERT.value or _WHAT.value == "reset"):
-    command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
   if _EXPERT.value:
     command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   elif _COLLECTION.value == "play":
     raise UserError("--collection=play needs --expert=scripted")
+  if _TASK.value and (_EXPERT.value or _WHAT.value == "reset"):
+    command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
+  look = recorder.Look(
+    max(32, _HEIGHT.value // rows),
+    max(32, _WIDTH.value // columns),
+    _CAMERA.value,
+    _EVERY.value,
+    _OVERLAY.value and _WHAT.value == "episode",
+    _SHADOWS.value,
+  )
   if _WHAT.value == "strips":
-    _film_strips()
-  elif _WHAT.value == "reset":
-    _picture_of_reset(task or lfgp_dmc.MAIN_TASKS[0], rows, columns)
+    _film_strips(look)
   else:
-    _film(task, rows, columns)
+    seeds = range(_SEED.value, _SEED.value + rows * columns)
+    film = _film if _WHAT.value == "episode" else _picture_of_resets
+    film(look, seeds, columns)
 
 
-def _film(task: str, rows: int, columns: int) -> None:
+def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
   """An episode, or a grid of them."""
   is_play = _COLLECTION.value == "play"
-  cast = policies.find(_RUN.value, _EXPERT.value, task, _HERTZ.value)
-  task = task or cast.main_task
-  if task != task_switch.SCHEDULED:
-    command.check_choice("task", task, (*cast.tasks, task_switch.SCHEDULED))
-  output = _checked_output(f"{cast.name}_{'play' if is_play else task}")
-  world = _checked_world(cast.world)
+  spec = policies.find(_RUN.value, _EXPERT.value, _TASK.value, _HERTZ.value)
+  task = _TASK.value or spec.main_task
+  command.check_choice("task", task, (*spec.tasks, clips.SCHEDULED))
+  output = _output(f"{spec.name}_{'play' if is_play else task}")
+  stage = clips.Stage(spec, task, look, is_play)
+  goal = spec.main_task if task == clips.SCHEDULED else task
+  steps, until = _STEPS.value or None, goal if _UNTIL.value else None
   played = [
-    film_strips.play(
-      cast,
-      task,
-      seed,
-      _look(rows, columns),
-      is_play=is_play,
-      max_steps=_STEPS.value or None,
-      until_success=_UNTIL.value,
-      environment=world,
-    )
-    for seed in range(_SEED.value, _SEED.value + rows * columns)
+    stage.play(seed, look.every, max_steps=steps, until_success_of=until)
+    for seed in seeds
+  ]
+  shown = [
+    {
+      "seed": seed,
+      "steps": clip.steps,
+      "first_success": clip.first_success,
+      "intentions": task_switch.spans(clip.labels, look.every / clip.checks),
+    }
+    for seed, clip in zip(seeds, played, strict=True)
   ]
   metadata = {
-    "actor": cast.name,
+    "actor": spec.name,
     "task": task,
-    "main_task": cast.main_task,
+    "main_task": spec.main_task,
     "collection": _COLLECTION.value,
-    "camera": _CAMERA.value,
-    "env_step": cast.env_step,
-    **_description(played[0], _SEED.value),
+    "camera": look.camera,
+    "env_step": spec.env_step,
+    **shown[0],
+    **({"grid": shown} if len(shown) > 1 else {}),
   }
-  if len(played) > 1:
-    metadata["grid"] = [
-      _description(clip, _SEED.value + i) for i, clip in enumerate(played)
-    ]
   frames = video.grid([clip.frames for clip in played], columns)
   if output.suffix == ".png":
     frames = video.film_strip(frames, _STRIP.value if len(played) == 1 else 1)
-  video.write(output, frames, _RATE / _EVERY.value, metadata)
+  video.write(output, frames, _RATE / look.every, metadata)
   for clip in played:
     done = ", ".join(f"{k} at step {v}" for k, v in clip.first_success.items())
     print(f"successes: {done or 'none'}")
   print(output)
 
 
-def _film_strips() -> None:
+def _film_strips(look: recorder.Look) -> None:
   """A row of frames for each main task."""
   if _EXPERT.value:
-    casts = [policies.find("", _EXPERT.value, t) for t in lfgp_dmc.MAIN_TASKS]
-    if _TASK.value:
-      casts = [policies.find("", _EXPERT.value, _TASK.value)]
+    tasks = [_TASK.value] if _TASK.value else lfgp_dmc.MAIN_TASKS
+    specs = [policies.find("", _EXPERT.value, task) for task in tasks]
   else:
-    casts = [policies.find(run, "") for run in _RUN.value.split(",")]
-  output = _checked_output("strips", (".png",))
-  for cast in casts:
-    _checked_world(cast.world).close()
-  look = recorder.Look(
-    _HEIGHT.value,
-    _WIDTH.value,
-    _CAMERA.value,
-    overlay=False,
-    shadows=_SHADOWS.value,
-  )
-  picture, shown = film_strips.rows(
-    casts, _SEED.value, look, _STRIP.value, _ATTEMPTS.value
-  )
-  video.write(output, [picture], metadata={"rows": shown})
+    specs = [policies.find(run, "") for run in _RUN.value.split(",")]
+  output = _output("strips", (".png",))
+  seeds = range(_SEED.value, _SEED.value + _ATTEMPTS.value)
+  cells, shown = [], []
+  for spec in specs:
+    task = spec.main_task
+    stage = clips.Stage(spec, task, look)
+    try:
+      row, seed, step = film_strips.row(stage.play, task, seeds, _STRIP.value)
+    except ValueError as error:
+      raise UserError(
+        f"{spec.name}: {error}; try more --attempts or another --seed"
+      ) from None
+    cells += [[frame] for frame in row]
+    shown.append({"task": task, "actor": spec.name, "seed": seed,
+                  "success_at": step})  # fmt: skip
+  video.write(output, video.grid(cells, _STRIP.value), metadata={"rows": shown})
   print(output)
 
 
-def _picture_of_reset(task: str, rows: int, columns: int) -> None:
+def _picture_of_resets(look: recorder.Look, seeds, columns: int) -> None:
   """The world after resets, before anybody acts."""
-  output = _checked_output(f"reset_{task}", (".png",))
-  environment = _checked_world(World(task))
-  look = _look(rows, columns)
-  recorder.prepare(environment, look)
-  pictures = []
-  for seed in range(_SEED.value, _SEED.value + rows * columns):
-    environment.reseed(seeding.derive(seed, "clip"))
-    environment.reset()
-    pictures.append([recorder.picture(environment, look)])
-  metadata = {"task": task, "seed": _SEED.value, "camera": _CAMERA.value}
+  task = _TASK.value or lfgp_dmc.MAIN_TASKS[0]
+  output = _output(f"reset_{task}", (".png",))
+  stage = clips.Stage(policies.find("", policies.SCRIPTED, task), task, look)
+  pictures = [stage.play(seed, every=1, max_steps=0).frames for seed in seeds]
+  metadata = {"task": task, "seed": seeds[0], "camera": look.camera}
   video.write(output, video.grid(pictures, columns), metadata=metadata)
   print(output)
 
 
-def _description(clip: recorder.Clip, seed: int) -> dict[str, Any]:
-  return {
-    "seed": seed,
-    "steps": clip.steps,
-    "first_success": clip.first_success,
-    "intentions": task_switch.spans(clip.labels, _EVERY.value / clip.checks),
-  }
-
-
-def _look(rows: int, columns: int) -> recorder.Look:
-  return recorder.Look(
-    max(32, _HEIGHT.value // rows),
-    max(32, _WIDTH.value // columns),
-    _CAMERA.value,
-    _EVERY.value,
-    _OVERLAY.value,
-    _SHADOWS.value,
-  )
-
-
 def _grid() -> tuple[int, int]:
   match = re.fullmatch(r"([1-9]\d?)x([1-9]\d?)", _GRID.value)
-  if not match or np.prod([int(n) for n in match.groups()]) > _MOST_CELLS:
+  rows, columns = map(int, match.groups()) if match else (0, 0)
+  if not 0 < rows * columns <= _MOST_CELLS:
     raise UserError(
       f"--grid={_GRID.value}; valid: ROWSxCOLUMNS, at most {_MOST_CELLS} cells"
     )
-  return int(match[1]), int(match[2])
+  return rows, columns
 
 
-def _checked_world(world: World):
-  """The environment, if it can be drawn by the camera asked for."""
-  fault = graphics.fault()
-  if fault:
-    raise UserError(fault)
-  environment = world.build()
-  command.check_choice(
-    "camera", _CAMERA.value, task_switch.cameras(environment)
-  )
-  return environment
-
-
-def _checked_output(
+def _output(
   stem: str, formats: tuple[str, ...] = video.FORMATS
 ) -> pathlib.Path:
   """Where the picture goes.

@@ -1,7 +1,7 @@
-"""Sees to it that pictures can be made without a display; see `make setup`.
+"""Installs what pictures need without a display; part of `make setup`.
 
-Installs Mesa's EGL where it may (root on Debian or Ubuntu), else prints the one
-command to run. Training needs no pictures, so this never fails.
+As root on Debian or Ubuntu it installs Mesa's EGL, else it prints the command.
+Training needs no pictures, so this never fails.
 """
 
 import os
@@ -23,7 +23,7 @@ def main() -> int:
     environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
     for command in (update, install):
       subprocess.run(command, env=environment, check=False)
-  # In a new process: this one has looked for the libraries already.
+  # In a new process: this one has cached its search for the libraries.
   check = "from lfgp_dmc import graphics as g; print(g.works_without_display())"
   found = subprocess.run(
     [sys.executable, "-c", check], capture_output=True, text=True, check=False

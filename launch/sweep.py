@@ -9,7 +9,9 @@ thread; one that dies is resumed from its checkpoint, and what is done is not
 done again, so the same command goes on with a sweep that was stopped. Ctrl-C
 lets the runs write
 their checkpoints. RUNS/index.csv has a row a run, RUNS/NAME.log its output.
-With --engine=ray the runs go to a Ray cluster that shares the runs' folder.
+With --ray_address=auto the runs go to a Ray cluster instead (`ray start` on
+each machine). Its nodes share this folder and have the same Python environment;
+a run whose node is lost is resumed on another.
 """
 
 import collections
@@ -47,12 +49,11 @@ _STARTS = flags.DEFINE_multi_string(
 _FLAGFILES = flags.DEFINE_string(
   "flagfiles", str(sweep_jobs.FLAGS), "Folder of the runs' flagfiles."
 )
-_ENGINE = flags.DEFINE_enum("engine", "local", ["local", "ray"], "Where.")
 _WORKERS = flags.DEFINE_integer(
   "workers", 0, "Runs at a time; 0: one a core.", lower_bound=0
 )
 _RAY_ADDRESS = flags.DEFINE_string(
-  "ray_address", "", "Of a cluster, such as auto; default: a local one."
+  "ray_address", "", "Of a cluster, such as auto; default: runs happen here."
 )
 _RESTARTS = flags.DEFINE_integer(
   "restarts", 3, "How often a run that died is resumed.", lower_bound=0
@@ -61,6 +62,9 @@ _DRY_RUN = flags.DEFINE_bool("dry_run", False, "Only list the runs.")
 
 _POLL = 0.2  # s
 _INDEX_EVERY = 30.0  # s
+# Before the second restart, twice that before the third: a file server holds a
+# lost machine's lock on a run's folder for up to 90 s.
+_REST = 30.0  # s
 
 
 def main() -> int:
@@ -104,7 +108,7 @@ def _jobs(runs: pathlib.Path) -> list[Job]:
 
 
 def _engine() -> sweep_engines.Engine:
-  if _ENGINE.value == "ray":
+  if _RAY_ADDRESS.value:
     return sweep_engines.RayEngine(_RAY_ADDRESS.value, _WORKERS.value)
   return sweep_engines.LocalEngine(_WORKERS.value or command.cores())
 
@@ -123,6 +127,7 @@ class Sweep:
     self._jobs, self._index, self._restarts = jobs, index, restarts
     self._by_name = {job.name: job for job in jobs}
     self._started: dict[str, float] = {}
+    self._rests_until: dict[str, float] = {}
 
   def run(self, engine: sweep_engines.Engine) -> bool:
     """Runs until nothing can be run; returns whether it was stopped."""
@@ -142,10 +147,10 @@ class Sweep:
           if changed or time.monotonic() - written > _INDEX_EVERY:
             sweep_jobs.write_index(self._jobs, self._index)
             written = time.monotonic()
-          if not self._started:
+          if not self._started and (stop or not self._is_any_resting()):
             return bool(stop)
           time.sleep(_POLL)
-      except KeyboardInterrupt:  # asked twice
+      except KeyboardInterrupt:  # the second request
         engine.kill()
         for name in self._started:
           self._by_name[name].state = sweep_jobs.STOPPED
@@ -167,7 +172,14 @@ class Sweep:
       print(f"started {job.name} (attempt {job.attempts})", flush=True)
     return len(self._started) > before
 
+  def _is_any_resting(self) -> bool:
+    return any(
+      job.state == sweep_jobs.WAITING and job.attempts for job in self._jobs
+    )
+
   def _may_start(self, job: Job) -> bool:
+    if time.monotonic() < self._rests_until.get(job.name, 0.0):
+      return False
     source = self._by_name.get(job.after)
     if source is None or source.state == sweep_jobs.DONE:
       return True
@@ -186,32 +198,36 @@ class Sweep:
       elif is_stopping:
         job.state = sweep_jobs.STOPPED
       else:
-        job.message, can_retry = _last_words(job.log, status)
-        can_retry &= job.attempts <= self._restarts
+        job.message, is_reported = _last_words(job.log, status)
+        # What a first attempt reports is the input's fault and will stay so; a
+        # later one may have met the lock of an attempt that is not dead yet.
+        is_hopeless = is_reported and job.attempts == 1
+        can_retry = job.attempts <= self._restarts and not is_hopeless
         job.state = sweep_jobs.WAITING if can_retry else sweep_jobs.FAILED
+        rest = (job.attempts - 1) * _REST
+        self._rests_until[name] = time.monotonic() + rest
       print(f"{job.state}: {name} {job.message}".rstrip(), flush=True)
     return bool(ended)
 
 
 def _last_words(log: pathlib.Path, status: int) -> tuple[str, bool]:
-  """Why a run ended, and whether another attempt may end otherwise."""
+  """Why a run ended, and whether it reported so itself in one line."""
   lines = []
   if log.is_file():
     # Progress bars go back to the line's start.
     text = log.read_text(encoding="utf-8", errors="replace")
     lines = [line.rpartition("\r")[2] for line in text.split("\n")]
   if status < 0:
-    return f"killed by {signal.Signals(-status).name}", True
-  told = [line.strip() for line in lines if line.strip()][-1:] or [""]
-  message = f"exit status {status}: {told[0][:200]}"
+    return f"killed by {signal.Signals(-status).name}", False
+  last = [line.strip() for line in lines if line.strip()][-1:] or [""]
+  message = f"exit status {status}: {last[0][:200]}"
   errors = [i for i, line in enumerate(lines) if line.startswith("error: ")]
-  # What a command tells in a line is the input's fault: it will stay so.
-  is_told = bool(errors) and not any(
+  is_reported = bool(errors) and not any(
     line.startswith(("Traceback", "$ train.py")) for line in lines[errors[-1] :]
   )
-  if is_told:
+  if is_reported:
     message = lines[errors[-1]]
-  return message, not is_told
+  return message, is_reported
 
 
 if __name__ == "__main__":

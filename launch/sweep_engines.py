@@ -1,24 +1,25 @@
 """Where the runs of a sweep happen: processes here, or a Ray cluster.
 
-Both start `launch/train.py` as its own process with one thread, and tell how it
-ended by its exit status.
+Both start `launch/train.py` as its own process with one thread, and report its
+exit status. The process dies with its starter.
 """
 
+import asyncio
 import os
 import pathlib
+import platform
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import Any, Protocol
+
+from absl import logging
 
 from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
-_POLL = 0.2  # s
-_KILL = "kill"  # in a stop file; an empty one asks for a checkpoint first
-_KILL = "kill"  # in a stop file; an empty one asks for a checkpoint first
+_CHILD = pathlib.Path(__file__).with_name("sweep_child.py")
 _VARIABLES = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
@@ -28,11 +29,11 @@ _VARIABLES = {
 
 
 class Engine(Protocol):
-  """Starts runs and says which ended."""
+  """Starts runs and reports their ends."""
 
   @property
   def slots(self) -> int:
-    """How many runs at a time."""
+    """Number of runs at a time; may change."""
 
   def start(self, name: str, arguments: Sequence[str], log: pathlib.Path):
     """Starts `launch/train.py`; its output is appended to `log`."""
@@ -41,7 +42,7 @@ class Engine(Protocol):
     """Name -> exit status of the runs that ended since the last call."""
 
   def interrupt(self) -> None:
-    """Asks all runs to write a checkpoint and end."""
+    """Requests a checkpoint and the end of all runs."""
 
   def kill(self) -> None:
     """Ends all runs at once."""
@@ -81,13 +82,16 @@ class LocalEngine:
 
 
 class RayEngine:
-  """One task a run on a Ray cluster, whose nodes share the runs' folder."""
+  """One actor a run on a Ray cluster, whose nodes share the runs' folder.
+
+  Ray places the actors, notices lost nodes, and ends the actors with the sweep.
+  """
 
   def __init__(self, address: str, slots: int = 0):
     """Connects.
 
     Args:
-      address: of the cluster, or "" to start one on this machine.
+      address: of the cluster, such as auto.
       slots: runs at a time; 0: as many as the cluster has cores.
 
     Raises:
@@ -97,93 +101,100 @@ class RayEngine:
       import ray
     except ImportError:
       raise UserError(
-        "--engine=ray needs Ray: pip install 'lfgp-dmc[ray]'"
+        "--ray_address needs Ray: pip install 'lfgp-dmc[ray]'"
       ) from None
-    self._ray = ray
     try:
-      ray.init(
-        address=address or None,
-        num_cpus=None if address else slots or None,
-        include_dashboard=None if address else False,
-        log_to_driver=False,
-        configure_logging=False,
-      )
+      ray.init(address, log_to_driver=False, configure_logging=False)
     except (ConnectionError, ValueError, RuntimeError) as error:
       raise UserError(f"--ray_address={address}: {error}") from None
-    self.slots = slots or int(ray.cluster_resources().get("CPU", 1))
-    # A run that is lost with its node is the sweep's to start again.
-    self._run = ray.remote(num_cpus=1, max_retries=0)(_train_and_wait)
-    self._running: dict[str, object] = {}
-    self._stops: dict[str, pathlib.Path] = {}
+    self._ray, self._slots = ray, slots
+    self._make_run: Any = ray.remote(num_cpus=1)(_RayRun)
+    self._running: dict[str, tuple[Any, Any]] = {}  # actor, exit status to be
+
+  @property
+  def slots(self) -> int:
+    """See `Engine`; follows the nodes that join and leave."""
+    cores = self._ray.cluster_resources().get("CPU", 0)
+    return self._slots or max(1, int(cores))
 
   def start(self, name, arguments, log) -> None:
     """See `Engine`."""
-    _stop_file(log).unlink(missing_ok=True)
-    self._stops[name] = _stop_file(log)
-    self._running[name] = self._run.remote(list(arguments), str(log))
+    run = self._make_run.remote(os.getcwd(), arguments, log)
+    self._running[name] = run, run.wait.remote()
 
   def ended(self) -> Mapping[str, int]:
-    """See `Engine`."""
-    if not self._running:
-      return {}
-    names = {reference: name for name, reference in self._running.items()}
-    ready, _ = self._ray.wait(
-      list(names), num_returns=len(names), timeout=0, fetch_local=False
-    )
+    """See `Engine`; a run that is lost with its node counts as killed."""
     over = {}
-    for reference in ready:
+    for name, (_, status) in list(self._running.items()):
+      if not self._ray.wait([status], timeout=0)[0]:
+        continue
+      del self._running[name]
       try:
-        over[names[reference]] = self._ray.get(reference)
-      except self._ray.exceptions.RayError:  # its process or node is gone
-        over[names[reference]] = -signal.SIGKILL
-      del self._running[names[reference]]
+        over[name] = self._ray.get(status)
+      except self._ray.exceptions.RayError as error:
+        logging.warning("%s: %s", name, error)
+        over[name] = -signal.SIGKILL
     return over
 
   def interrupt(self) -> None:
     """See `Engine`."""
-    for name in self._running:  # Ray workers block SIGINT, so cancel() fails
-      self._stops[name].touch()
+    for run, _ in self._running.values():
+      run.terminate.remote()
 
   def kill(self) -> None:
     """See `Engine`."""
-    for name in self._running:
-      self._stops[name].write_text(_KILL, encoding="utf-8")
-    time.sleep(5 * _POLL)  # until the workers have seen it
+    self._ray.shutdown()
 
 
-def _stop_file(log: str | pathlib.Path) -> pathlib.Path:
-  """Where the sweep asks a run on another machine to stop."""
-  return pathlib.Path(log).with_suffix(".stop")
+class _RayRun:
+  """A run's process on some node of the cluster."""
+
+  def __init__(self, folder: str, arguments: Sequence[str], log: pathlib.Path):
+    import ray
+
+    os.chdir(folder)
+    node = ray.get_runtime_context().get_node_id()
+    self._process = popen(arguments, log, f"{platform.node()}, {node}")
+
+  async def wait(self) -> int:
+    """Returns the exit status."""
+    return await asyncio.to_thread(self._process.wait)
+
+  async def terminate(self) -> None:
+    """Requests a checkpoint and the end."""
+    self._process.terminate()
 
 
-def popen(arguments: Sequence[str], log: pathlib.Path) -> subprocess.Popen:
+def popen(
+  arguments: Sequence[str], log: pathlib.Path, place: str = platform.node()
+) -> subprocess.Popen:
   """Starts `launch/train.py` in a process group of its own.
 
   Signals of the terminal do not reach it: the sweep passes one on, once.
+
+  Args:
+    arguments: of `launch/train.py`.
+    log: gets the command, the place and the output at its end.
+    place: name of this machine.
   """
   log.parent.mkdir(parents=True, exist_ok=True)
   with open(log, "a", encoding="utf-8") as output:
-    output.write(f"$ train.py {' '.join(arguments)}\n")
+    # A killed attempt leaves the log within a line.
+    lead = "\n" if output.tell() else ""
+    output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
     output.flush()
     return subprocess.Popen(
-      [sys.executable, str(_TRAIN), *arguments],
+      [
+        sys.executable,
+        str(_CHILD),
+        str(os.getpid()),
+        sys.executable,
+        str(_TRAIN),
+        *arguments,
+      ],
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,
       env={**os.environ, **_VARIABLES},
       start_new_session=True,
     )
-
-
-def _train_and_wait(arguments: list[str], log: str) -> int:
-  """What a Ray worker does for one run."""
-  stop = _stop_file(log)
-  process = popen(arguments, pathlib.Path(log))
-  while process.poll() is None:
-    if stop.exists():
-      if stop.read_text(encoding="utf-8") == _KILL:
-        os.killpg(process.pid, signal.SIGKILL)
-      process.terminate()
-      stop.unlink()
-    time.sleep(_POLL)
-  return process.returncode

@@ -1,8 +1,8 @@
-"""Chooses how MuJoCo draws, which is fixed once it has been imported.
+"""Chooses MuJoCo's rendering backend.
 
 MuJoCo and dm_control read `MUJOCO_GL` at their first import. With no display
-and no choice they take GLFW, warn, and fail at the first picture; so whoever
-imports them first calls `choose_backend` before.
+and no choice they take GLFW, warn, and fail at the first picture: call
+`choose_backend` before importing them.
 """
 
 import ctypes
@@ -13,19 +13,13 @@ import sys
 
 BACKENDS = ("glfw", "egl", "osmesa", "off")
 # Mesa's EGL on Debian and Ubuntu; it needs no GPU.
-PACKAGES = (
-  "libegl1",
-  "libegl-mesa0",
-  "libgl1-mesa-dri",
-  "libgles2",
-  "libopengl0",
-)
-INSTALL = (
+PACKAGES = ("libegl1", "libegl-mesa0", "libgl1-mesa-dri", "libgles2",
+            "libopengl0")  # fmt: skip
+
+_INSTALL = (
   f"install Mesa's EGL (Debian, Ubuntu: apt-get install {' '.join(PACKAGES)})"
 )
-
 _GL = "MUJOCO_GL"
-_PLATFORM = "PYOPENGL_PLATFORM"
 _OFF = ("off", "disable", "disabled", "false", "0")
 _PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
 _MOST_DEVICES = 16
@@ -51,7 +45,7 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
     chosen = _best(render, window)
     os.environ[_GL] = chosen
   if chosen in ("egl", "osmesa"):
-    os.environ[_PLATFORM] = chosen
+    os.environ["PYOPENGL_PLATFORM"] = chosen
   return chosen or "glfw"
 
 
@@ -60,12 +54,12 @@ def fault() -> str:
   chosen = os.environ.get(_GL, "").lower().strip()
   if chosen in _OFF:
     return f"no pictures: MUJOCO_GL is {chosen!r}; " + (
-      "unset it" if works_without_display() else INSTALL
+      "unset it" if works_without_display() else _INSTALL
     )
   if chosen not in ("", *BACKENDS):
     return f"MUJOCO_GL is {chosen!r}; valid: {', '.join(BACKENDS)}"
   if chosen == "egl" and not _egl_works():
-    return f"MUJOCO_GL is 'egl', but EGL does not work: {INSTALL}"
+    return f"MUJOCO_GL is 'egl', but EGL does not work: {_INSTALL}"
   if chosen == "osmesa" and not _osmesa_works():
     return "MUJOCO_GL is 'osmesa', but there is no OSMesa: unset it"
   if chosen in ("", "glfw") and not has_display():
@@ -86,11 +80,9 @@ def has_display() -> bool:
 
 
 def _best(render: bool, window: bool) -> str:
-  if window:
-    return "glfw"
-  if not render:
+  if not (render or window):
     return "off"
-  if sys.platform != "linux":
+  if window or sys.platform != "linux":
     return "glfw"
   if _egl_works():
     return "egl"
@@ -118,20 +110,16 @@ def _egl_works() -> bool:
     return False
   devices = (ctypes.c_void_p * _MOST_DEVICES)()
   count = ctypes.c_int(0)
+  pointer, number = ctypes.c_void_p, ctypes.c_int
   query_type = ctypes.CFUNCTYPE(
-    ctypes.c_uint,
-    ctypes.c_int,
-    ctypes.POINTER(ctypes.c_void_p),
-    ctypes.POINTER(ctypes.c_int),
+    ctypes.c_uint, number, ctypes.POINTER(pointer), ctypes.POINTER(number)
   )
-  display_type = ctypes.CFUNCTYPE(
-    ctypes.c_void_p, ctypes.c_uint, ctypes.c_void_p, ctypes.c_void_p
-  )
+  display_type = ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)
   if not query_type(query)(_MOST_DEVICES, devices, ctypes.byref(count)):
     return False
   for device in devices[: count.value]:
     display = display_type(get_display)(_PLATFORM_DEVICE, device, None)
-    # Left open: MuJoCo will get the same display, and so may have already.
+    # Left open: MuJoCo gets the same display.
     if display and egl.eglInitialize(ctypes.c_void_p(display), None, None):
       return True
   return False

@@ -18,7 +18,7 @@ from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
-from lfgp_dmc.types import Episode, Metrics, Period
+from lfgp_dmc.types import Episode, Metrics
 
 
 class LfgpAgent:
@@ -36,7 +36,6 @@ class LfgpAgent:
     *,
     xi: int,
     discount: float,
-    random_steps: int,
   ):
     """Puts the parts together; see `builder.build`.
 
@@ -50,7 +49,6 @@ class LfgpAgent:
       seed: of acting.
       xi: steps a choice.
       discount: gamma, of the scheduler's returns.
-      random_steps: first steps with actions from U[-1, 1].
     """
     self.tasks = tuple(tasks)
     self.learner = learner
@@ -60,11 +58,10 @@ class LfgpAgent:
     self._pretraining = pretraining
     self._experts = experts
     self._acting = seeding.generator(seed, "acting")
-    self._xi, self._discount, self._random_steps = xi, discount, random_steps
+    self._xi, self._discount = xi, discount
     device = learner.networks.log_temperature.device
     self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, device)
     self._choices = np.zeros(len(self.tasks), np.int64)
-    self._env_steps = 0
     self._episode_step = 0
     self._task = self.tasks[0]
     self._first_updates = 0  # before the first step, after a transfer
@@ -163,30 +160,16 @@ class LfgpAgent:
       observation: float32 [O].
 
     Returns:
-      float32 [A]; from U[-1, 1] during the first `random_steps` steps.
+      float32 [A].
     """
     if self._episode_step % self._xi == 0:
-      self._choose()
+      index = self._scheduler.next_task()
+      self._choices[index] += 1
+      self._task = self.tasks[index]
     self._episode_step += 1
-    self._env_steps += 1
-    if self._env_steps <= self._random_steps:
-      size = self.policy.action_size
-      return self._acting.uniform(-1, 1, size).astype(np.float32)
     return self.policy.act(
       observation, self._task, deterministic=False, generator=self._acting
     )
-
-  def next_period(self, env_step: int) -> Period:
-    """Steps the scheduler for an actor elsewhere; see `types.Agent`."""
-    self._choose()
-    self._env_steps = env_step
-    random_steps = max(0, self._random_steps - env_step)
-    return Period(self._task, self._xi, random_steps)
-
-  def _choose(self) -> None:
-    index = self._scheduler.next_task()
-    self._choices[index] += 1
-    self._task = self.tasks[index]
 
   def end_episode(self, episode: Episode) -> None:
     """Lets the scheduler learn from the main task's reward.
@@ -229,7 +212,6 @@ class LfgpAgent:
       "choices": self._choices.copy(),
       "acting": serialisation.numpy_generator_state(self._acting),
       "sampling": serialisation.numpy_generator_state(self.batches.generator),
-      "env_steps": self._env_steps,
       "has_started": self._has_started,
     }
 
@@ -243,7 +225,6 @@ class LfgpAgent:
     serialisation.load_numpy_generator_state(
       self.batches.generator, state["sampling"]
     )
-    self._env_steps = int(state["env_steps"])
     self._has_started = bool(state["has_started"])
     self._refresh_inputs()
     self._episode_step = 0

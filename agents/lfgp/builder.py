@@ -23,7 +23,7 @@ from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, make_networks
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
-from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards, reward_columns
+from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards
 from lfgp_dmc.agents.schedulers import make_scheduler
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
@@ -39,7 +39,6 @@ def build(
   observation_size: int,
   action_size: int,
   *,
-  random_steps: int = 0,
   bfloat16: bool = False,
   cuda_graphs: bool = True,
 ) -> LfgpAgent:
@@ -54,7 +53,6 @@ def build(
     device: where to compute.
     observation_size: O.
     action_size: A.
-    random_steps: first steps with actions from U[-1, 1].
     bfloat16: products in bfloat16; parameters stay float32.
     cuda_graphs: on a GPU, updates are recorded, then replayed.
 
@@ -80,7 +78,7 @@ def build(
   recorder = None
   if device.type == "cuda" and cuda_graphs:
     recorder = CudaRecorder(noise)
-  columns = reward_columns(replay, tasks) if config.keeps_rewards else []
+  columns = replay.reward_columns(tasks) if config.keeps_rewards else []
   learner = make_learner(config, networks, noise, dtype, recorder, columns)
   batches = BatchMaker(
     config.reward,
@@ -103,7 +101,6 @@ def build(
     seed,
     xi=config.scheduler.xi,
     discount=config.critic.discount,
-    random_steps=random_steps,
   )
 
 

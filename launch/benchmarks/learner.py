@@ -114,7 +114,10 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
 
 
 def time_shares(agent, seconds: float) -> dict[str, float]:
-  """How an update's time is divided: part -> share; `rest` is all else."""
+  """How an update's time is divided: part -> share; `rest` is all else.
+
+  The agent keeps the timers.
+  """
   spent: dict[str, float] = {}
   learner = agent.learner
   parts = {

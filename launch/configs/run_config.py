@@ -15,7 +15,7 @@ from lfgp_dmc.agents.fields import (
   checked,
 )
 from lfgp_dmc.agents.lfgp import LfgpConfig
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
 EPISODE_SECONDS = 18  # of the block tasks
@@ -73,7 +73,6 @@ class RunConfig:
   threads: Count = 1  # of torch; 0: one a core that this process may use
   bfloat16: Switch = False  # products in bfloat16; parameters stay float32
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
-  actor_process: Switch = False  # act in another process, while this one learns
   deterministic: Switch = False  # the same numbers again, after a resume too
 
   agent: LfgpConfig | BcConfig = LfgpConfig()  # the algorithm's own settings
@@ -116,9 +115,9 @@ class RunConfig:
       )
 
   @property
-  def world(self) -> World:
+  def world(self) -> EnvironmentSpec:
     """Where the agent acts."""
-    return World(self.main_task, self.environment, self.control_hz)
+    return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
 
   @property
   def most_episode_steps(self) -> int:

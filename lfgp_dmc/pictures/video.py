@@ -1,4 +1,4 @@
-"""Clips, pictures and film strips from frames, each with a JSON sidecar."""
+"""Clips, pictures and film strips of frames, each with a JSON sidecar."""
 
 import pathlib
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ def write(
     path: `.mp4`, `.gif`, or `.png` (all frames side by side: a film strip).
     frames: at least one, uint8 [height, width, 3], all of one size.
     fps: frames a second.
-    metadata: what the clip shows; goes into the sidecar with its size.
+    metadata: for the sidecar, beside size and rate.
 
   Returns:
     The path written.
@@ -38,6 +38,7 @@ def write(
   if suffix not in FORMATS:
     raise ValueError(f"{path}: unknown format; valid: {', '.join(FORMATS)}")
   frames = _checked(frames)
+  height, width, _ = frames[0].shape
   path.parent.mkdir(parents=True, exist_ok=True)
   with files.replacing(path) as aside:
     if suffix == ".png":
@@ -46,20 +47,12 @@ def write(
       imageio.mimwrite(aside, frames, duration=1000 / fps, loop=0)
     else:
       # yuv420p halves the colours' resolution: sides must be even.
-      even = [_padded_to_even(frame) for frame in frames]
+      odd = ((0, height % 2), (0, width % 2), (0, 0))
+      even: list[Any] = [np.pad(frame, odd, mode="edge") for frame in frames]
       imageio.mimwrite(aside, even, fps=fps, quality=8, macro_block_size=2)
-  height, width = frames[0].shape[:2]
-  files.write_json(
-    path.with_suffix(".json"),
-    {
-      "file": path.name,
-      "frames": len(frames),
-      "fps": fps,
-      "width": width,
-      "height": height,
-      **(metadata or {}),
-    },
-  )
+  size = {"frames": len(frames), "fps": fps, "width": width, "height": height}
+  facts = {"file": path.name, **size, **(metadata or {})}
+  files.write_json(path.with_suffix(".json"), facts)
   return path
 
 
@@ -83,24 +76,19 @@ def grid(
     clip has.
   """
   blank = np.full_like(clips[0][0], 255)
+  height, width, _ = blank.shape
   rows = -(-len(clips) // columns)
   frames = []
   for i in range(max(map(len, clips))):
-    now = [clip[min(i, len(clip) - 1)] for clip in clips]
-    now += [blank] * (rows * columns - len(now))
-    frames.append(
-      np.concatenate(
-        [
-          np.concatenate(now[row * columns : (row + 1) * columns], axis=1)
-          for row in range(rows)
-        ]
-      )
-    )
+    cells = [clip[min(i, len(clip) - 1)] for clip in clips]
+    cells += [blank] * (rows * columns - len(cells))
+    table = np.reshape(cells, (rows, columns, height, width, 3)).swapaxes(1, 2)
+    frames.append(table.reshape(rows * height, columns * width, 3))
   return frames
 
 
 def label(
-  frame: np.ndarray, left: str, right: str = "", highlight: bool = False
+  frame: np.ndarray, left: str, right: str, highlight: bool = False
 ) -> np.ndarray:
   """Draws a caption on a dark strip along the top of a frame.
 
@@ -108,23 +96,20 @@ def label(
     frame: uint8 [height, width, 3]; left unchanged.
     left: such as the intention's name.
     right: such as the step and the success.
-    highlight: green strip instead of a dark one, such as after success.
+    highlight: a green strip instead of a dark one.
 
   Returns:
     uint8 [height, width, 3].
   """
   image = Image.fromarray(frame)
   size = max(10, frame.shape[0] // 20)
-  font = ImageFont.load_default(size)
-  margin = size // 2
+  font, margin = ImageFont.load_default(size), size // 2
   draw = ImageDraw.Draw(image, "RGBA")
   strip = (20, 110, 50, 190) if highlight else (0, 0, 0, 140)
   draw.rectangle((0, 0, image.width, size + 2 * margin), fill=strip)
-  middle = margin + size / 2
-  white = (255, 255, 255, 255)
+  middle, white = margin + size / 2, (255, 255, 255, 255)
   draw.text((margin, middle), left, white, font, anchor="lm")
-  if right:
-    draw.text((image.width - margin, middle), right, white, font, anchor="rm")
+  draw.text((image.width - margin, middle), right, white, font, anchor="rm")
   return np.asarray(image)
 
 
@@ -144,8 +129,3 @@ def _checked(frames: Sequence[np.ndarray]) -> list[Any]:
         f"frames of two sizes: {list(frames[0].shape)} and {list(shape)}"
       )
   return frames
-
-
-def _padded_to_even(frame: np.ndarray) -> Any:
-  height, width = frame.shape[:2]
-  return np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")

@@ -22,6 +22,7 @@ from lfgp_dmc.agents.lfgp.networks import make_networks
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics, pytree
+from lfgp_dmc.runs.schedule import TrainSchedule
 
 TASKS = ("stack", "reach", "lift")
 OBS, A, B = 6, 2, 32
@@ -63,7 +64,6 @@ def make_agent(
   replay=None,
   observations: int = OBS,
   actions: int = A,
-  random_steps: int = 0,
   bfloat16: bool = False,
   **fields: Any,
 ):
@@ -83,7 +83,6 @@ def make_agent(
     "cpu",
     observations,
     actions,
-    random_steps=random_steps,
     bfloat16=bfloat16,
   )
 
@@ -184,7 +183,7 @@ def make_toy_agent(
 
 def train_on_toy(agent, replay, env_steps: int, folder: str) -> None:
   """Updates once a step, from 100 steps on."""
-  schedule = loop.TrainSchedule(
+  schedule = TrainSchedule(
     env_steps=env_steps, warmup_steps=100, progress_bar=False
   )
   log = metrics.MetricsLog(folder)

@@ -10,17 +10,16 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc import graphics
 from lfgp_dmc.launch import set_up_graphics
 
-_PRINT = (
-  "import os; from lfgp_dmc import graphics; "
-  "print(graphics.choose_backend({}), os.environ['MUJOCO_GL'], "
-  "os.environ.get('PYOPENGL_PLATFORM'))"
-)
-
 
 def _in_new_process(arguments: str = "", **variables: str) -> list[str]:
-  kept = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
-  clean = {k: v for k, v in os.environ.items() if k not in kept}
-  code = _PRINT.format(arguments)
+  """The backend and both variables, after it was chosen."""
+  names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
+  code = (
+    "import os; from lfgp_dmc import graphics; "
+    f"print(graphics.choose_backend({arguments}), os.environ['MUJOCO_GL'], "
+    "os.environ.get('PYOPENGL_PLATFORM'))"
+  )
+  clean = {k: v for k, v in os.environ.items() if k not in names}
   done = subprocess.run(
     [sys.executable, "-c", code],
     env={**clean, **variables},
@@ -47,47 +46,38 @@ class ChooseBackendTest(parameterized.TestCase):
     platform = backend if backend in ("egl", "osmesa") else "x11"
     self.assertEqual(found, [backend, backend, platform])
 
-  def test_falls_back_to_osmesa_then_to_none(self):
-    with (
-      mock.patch.object(graphics, "_egl_works", lambda: False),
-      mock.patch.dict(os.environ, clear=True),
-    ):
-      with mock.patch.object(graphics, "_osmesa_works", lambda: True):
-        self.assertEqual(graphics._best(render=True, window=False), "osmesa")
-      with mock.patch.object(graphics, "_osmesa_works", lambda: False):
-        self.assertEqual(graphics._best(render=True, window=False), "off")
+  @parameterized.parameters((True, "osmesa"), (False, "off"))
+  @mock.patch.dict(os.environ, clear=True)
+  @mock.patch.object(graphics, "_egl_works", lambda: False)
+  def test_falls_back_to_osmesa_then_to_none(self, has_osmesa, expected):
+    with mock.patch.object(graphics, "_osmesa_works", lambda: has_osmesa):
+      self.assertEqual(graphics._best(render=True, window=False), expected)
 
   @parameterized.parameters(
-    ("off", "unset it"),
-    ("glfw", "there is no display"),
-    ("gdi", "valid: glfw, egl, osmesa, off"),
+    ("off", True, "unset it"),
+    ("off", False, "libegl1"),
+    ("glfw", True, "there is no display"),
+    ("gdi", True, "valid: glfw, egl, osmesa, off"),
   )
-  def test_fault_says_what_to_do(self, backend, message):
+  def test_fault_says_what_to_do(self, backend, has_egl, message):
     with (
       mock.patch.dict(os.environ, {"MUJOCO_GL": backend}, clear=True),
-      mock.patch.object(graphics, "_egl_works", lambda: True),
+      mock.patch.object(graphics, "works_without_display", lambda: has_egl),
     ):
       self.assertIn(message, graphics.fault())
 
-  def test_fault_without_any_backend_names_the_packages(self):
-    with (
-      mock.patch.dict(os.environ, {"MUJOCO_GL": "off"}, clear=True),
-      mock.patch.object(graphics, "works_without_display", lambda: False),
-    ):
-      self.assertIn("libegl1", graphics.fault())
-
 
 class SetUpGraphicsTest(absltest.TestCase):
+  @mock.patch.object(graphics, "works_without_display", lambda: False)
+  @mock.patch.object(os, "geteuid", lambda: 1000)
   def test_without_rights_prints_the_command(self):
+    checked = mock.Mock(stdout="False\n")
     with (
-      mock.patch.object(graphics, "works_without_display", lambda: False),
-      mock.patch.object(os, "geteuid", lambda: 1000),
-      mock.patch.object(subprocess, "run") as run,
+      mock.patch.object(subprocess, "run", return_value=checked) as run,
       mock.patch("builtins.print") as printed,
     ):
-      run.return_value.stdout = "False\n"
       self.assertEqual(set_up_graphics.main(), 0)
-    self.assertEqual(run.call_count, 1)  # the check alone
+    run.assert_called_once()  # the check alone
     self.assertIn("apt-get install -y libegl1", printed.call_args.args[0])
 
 

@@ -5,7 +5,7 @@ import json
 import pathlib
 import subprocess
 import sys
-import tempfile
+import unittest
 from unittest import mock
 
 import imageio.v2 as imageio
@@ -13,47 +13,22 @@ import numpy as np
 from absl.testing import absltest
 
 import lfgp_dmc
-from lfgp_dmc import graphics, task_names
+from lfgp_dmc import graphics
 from lfgp_dmc.data import demonstrations
-from lfgp_dmc.launch import (
-  command,
-  film_strips,
-  policies,
-  task_switch,
-  training,
-  view,
-)
+from lfgp_dmc.launch import clips, command, policies, view
 from lfgp_dmc.pictures.recorder import Look
-from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
-_SMALL = ("--height=64", "--width=96", "--noshadows")
+_POLICY = str(_ROOT / "results" / "policies" / "stack")
+_SMALL = "--height=64 --width=96 --noshadows"
 
 
-class _PolicyTest(absltest.TestCase):
-  """With the policy folder of an agent that learned nothing."""
-
-  @classmethod
-  def setUpClass(cls):
-    super().setUpClass()
-    temporary = tempfile.TemporaryDirectory()
-    cls.addClassCleanup(temporary.cleanup)
-    cls.folder = pathlib.Path(temporary.name)
-    dataset = fixtures.write_dataset(
-      cls.folder / "data", task_names.task_set("stack"), 59, 4
-    )
-    config = fixtures.small_config(dataset, environment="", main_task="stack")
-    cls.policy = cls.folder / "policy"
-    cls.policy.mkdir()
-    training.write_untrained_policy(config, cls.policy)
-
-
-class PolicyTest(_PolicyTest):
+class PolicyTest(absltest.TestCase):
   def test_loads_in_user_code(self):
     env = lfgp_dmc.load("stack", seed=0, time_limit=0.5)
     timestep = env.reset()
     act = {
-      task: lfgp_dmc.load_policy(self.policy, task)
+      task: lfgp_dmc.load_policy(_POLICY, task)
       for task in (None, "stack", "reach")
     }
     while not timestep.last():
@@ -66,136 +41,120 @@ class PolicyTest(_PolicyTest):
       timestep = env.step(action["reach"])
     env.close()
     with self.assertRaisesRegex(ValueError, "no intention 'insert'; it has"):
-      lfgp_dmc.load_policy(self.policy, "insert")
+      lfgp_dmc.load_policy(_POLICY, "insert")
 
   def test_acts_in_the_viewer_for_the_named_task(self):
-    cast = policies.find(str(self.policy), "")
-    reach = lfgp_dmc.load_policy(self.policy, "reach")
-    seen = []
+    reach = lfgp_dmc.load_policy(_POLICY, "reach")
 
     def launch(environment, policy, title):
+      self.assertEqual(title, "LfGP-DMC: reach")
       timestep = environment.reset()
       for _ in range(3):
         action = policy(timestep)
         expected = reach(lfgp_dmc.flatten(timestep.observation))
         np.testing.assert_array_equal(action, expected)
         timestep = environment.step(action)
-      seen.append(title)
-      environment.close()
 
-    viewer = mock.Mock(launch=launch)
-    modules = {"dm_control.viewer": viewer}
+    viewer = mock.Mock(launch=mock.Mock(side_effect=launch))
     with (
-      mock.patch.dict(sys.modules, modules),
+      mock.patch.dict(sys.modules, {"dm_control.viewer": viewer}),
       mock.patch("dm_control.viewer", viewer, create=True),
     ):
-      view._open(cast, "reach")
-    self.assertEqual(seen, ["LfGP-DMC: reach"])
+      view._open(policies.find(_POLICY, ""), "reach")
+    viewer.launch.assert_called_once()
 
 
-class RenderingTest(_PolicyTest):
+@unittest.skipIf(graphics.fault(), graphics.fault())
+class RenderingTest(absltest.TestCase):
   def setUp(self):
     super().setUp()
-    if graphics.fault():
-      self.skipTest(graphics.fault())
+    self.folder = pathlib.Path(self.create_tempdir().full_path)
 
-  def _render(self, *arguments) -> subprocess.CompletedProcess:
+  def _render(self, line: str) -> subprocess.CompletedProcess:
+    script = _ROOT / "launch" / "render_policy.py"
     return subprocess.run(
-      [
-        sys.executable,
-        _ROOT / "launch" / "render_policy.py",
-        *_SMALL,
-        *arguments,
-      ],
+      [sys.executable, script, *_SMALL.split(), *line.split()],
       cwd=self.folder,
       capture_output=True,
       text=True,
       check=False,
     )
 
-  def test_a_grid_shows_several_seeds_of_an_intention(self):
-    done = self._render("--run=policy", "--task=reach", "--grid=1x3",
-                        "--steps=8", "--every=4", "--output=g.gif")  # fmt: skip
+  def _rendered(self, line: str, name: str):
+    """The picture or frames, and what the sidecar says."""
+    done = self._render(f"{line} --output={name}")
     self.assertEqual(done.returncode, 0, done.stderr)
-    frames = imageio.mimread(self.folder / "g.gif")
+    path = self.folder / name
+    read = imageio.mimread if path.suffix == ".gif" else imageio.imread
+    return read(path), json.loads(path.with_suffix(".json").read_text())
+
+  def test_a_grid_shows_several_seeds_of_an_intention(self):
+    frames, sidecar = self._rendered(
+      f"--run={_POLICY} --task=reach --grid=1x3 --steps=3 --every=4", "g.gif"
+    )
     self.assertEqual(frames[0].shape[:2], (64, 96))
-    sidecar = json.loads((self.folder / "g.json").read_text())
     self.assertEqual(sidecar["task"], "reach")
     self.assertEqual([one["seed"] for one in sidecar["grid"]], [0, 1, 2])
 
   def test_low_control_rates_are_filmed_every_50_ms(self):
-    done = self._render("--expert=scripted", "--task=reach", "--control_hz=5",
-                        "--steps=3", "--every=2", "--output=h.gif")  # fmt: skip
-    self.assertEqual(done.returncode, 0, done.stderr)
-    sidecar = json.loads((self.folder / "h.json").read_text())
+    frames, sidecar = self._rendered(
+      "--expert=scripted --task=reach --control_hz=5 --steps=3 --every=2",
+      "h.gif",
+    )
     self.assertEqual((sidecar["frames"], sidecar["fps"]), (7, 10.0))
-    frames = imageio.mimread(self.folder / "h.gif")
     for one, next_one in itertools.pairwise(frames):
       self.assertFalse(np.array_equal(one, next_one))
 
   def test_strips_show_a_success(self):
-    done = self._render("--what=strips", "--expert=scripted", "--task=reach",
-                        "--strip_frames=4", "--output=s.png")  # fmt: skip
-    self.assertEqual(done.returncode, 0, done.stderr)
-    picture = imageio.imread(self.folder / "s.png")
+    picture, sidecar = self._rendered(
+      "--what=strips --strip_frames=4 --expert=scripted --task=reach", "s.png"
+    )
     self.assertEqual(picture.shape, (64, 4 * 96, 3))
-    (row,) = json.loads((self.folder / "s.json").read_text())["rows"]
+    (row,) = sidecar["rows"]
     self.assertGreater(row["success_at"], 5)
-    with self.assertRaisesRegex(command.UserError, "no success of stack in 1"):
-      film_strips.rows(
-        [policies.find(str(self.policy), "")], 0, Look(32, 32), 2, attempts=1
-      )
 
   def test_a_reset_needs_no_actor(self):
-    done = self._render(
-      "--what=reset", "--task=insert", "--grid=1x2", "--output=r.png"
+    picture, _ = self._rendered(
+      "--what=reset --task=insert --grid=1x2", "r.png"
     )
-    self.assertEqual(done.returncode, 0, done.stderr)
-    picture = imageio.imread(self.folder / "r.png")
     self.assertEqual(picture.shape, (64, 96, 3))
     self.assertFalse(np.array_equal(picture[:, :48], picture[:, 48:]))
     for bad, message in (
-      (["--grid=2"], "--grid=2; valid: ROWSxCOLUMNS"),
-      (["--output=a.mp4"], "unknown format; valid: .png"),
-      (["--camera=up"], "--camera=up is unknown; valid: "),
+      ("--grid=2", "--grid=2; valid: ROWSxCOLUMNS"),
+      ("--output=a.mp4", "unknown format; valid: .png"),
+      ("--camera=up", "unknown camera 'up'; valid: "),
     ):
-      done = self._render("--what=reset", *bad)
+      done = self._render(f"--what=reset {bad}")
       self.assertEqual(done.returncode, 1)
       self.assertIn(message, done.stderr)
 
-  def test_frames_tell_what_the_scheduler_chose(self):
-    captions = []
+  def test_frames_name_the_schedulers_choice(self):
+    spec = policies.find(_POLICY, "")
+    stage = clips.Stage(spec, clips.SCHEDULED, Look(32, 32))
 
-    def label(frame, left, right, highlight):
-      captions.append((left, right, highlight))
-      return frame
+    def choices(step, timestep):
+      return "reach" if step < 2 else "close_gripper"
 
-    def switch(*_):
-      return lambda step, timestep: "reach" if step < 2 else "close_gripper"
-
-    cast = policies.find(str(self.policy), "")
     with (
-      mock.patch("lfgp_dmc.pictures.video.label", label),
-      mock.patch.object(task_switch, "make_switch", switch),
+      mock.patch(
+        "lfgp_dmc.pictures.video.label",
+        side_effect=lambda frame, *_, **__: frame,
+      ) as label,
+      mock.patch.object(clips, "scheduled", lambda *_: choices),
     ):
-      clip = film_strips.play(
-        cast, task_switch.SCHEDULED, 0, Look(32, 32), max_steps=2
-      )
+      clip = stage.play(0, every=4, max_steps=2)
     self.assertEqual(clip.labels, ["reach", "reach", "close_gripper"])
-    self.assertEqual(captions[0], ("scheduler: reach", "step 0", False))
-    self.assertEqual(captions[2][0], "scheduler: close gripper")
+    first, *_, last = label.call_args_list
+    self.assertEqual(first.args[1:], ("scheduler: reach", "step 0"))
+    self.assertEqual(first.kwargs, {"highlight": False})
+    self.assertEqual(last.args[1], "scheduler: close gripper")
 
 
 class OwnArraysTest(absltest.TestCase):
   def test_the_readmes_lines_write_a_dataset(self):
-    text = (_ROOT / "README.md").read_text(encoding="utf-8")
-    (code,) = [
-      block.partition("```")[0]
-      for block in text.split("```python\n")[1:]
-      if "d.write(" in block.partition("```")[0]
-    ]
-    folder = pathlib.Path(self.create_tempdir().full_path)
-    (folder / "data" / "mine").mkdir(parents=True)
+    blocks = (_ROOT / "README.md").read_text().split("```")
+    (code,) = [block for block in blocks if "d.write(" in block]
+    folder = self.create_tempdir("data/mine").full_path
     arrays = {
       "observation": np.zeros((5, 59), np.float32),
       "action": np.zeros((5, 4), np.float32),
@@ -203,8 +162,9 @@ class OwnArraysTest(absltest.TestCase):
       "episode": np.array([0, 0, 1, 1, 1], np.int32),
       "is_last": np.array([False, True, False, False, True]),
     }
-    exec(code.replace('"data/mine', f'"{folder}/data/mine'), arrays)
-    found = demonstrations.read_folder(folder / "data/mine", ["stack"], 59, 4)
+    code = code.removeprefix("python").replace("data/mine", folder)
+    exec(code, arrays)
+    found = demonstrations.read_folder(folder, ["stack"], 59, 4)
     self.assertLen(found["stack"], 5)
 
 

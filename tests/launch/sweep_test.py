@@ -1,21 +1,14 @@
 """Sweeps: which runs there are, and how they come to their end."""
 
-import importlib.util
 import json
-import os
 import pathlib
-import signal
-import subprocess
-import sys
 import time
+from unittest import mock
 
 from absl.testing import absltest
 
 from lfgp_dmc.data import csv_files
-from lfgp_dmc.launch import command, sweep, sweep_jobs
-from tests.launch import fixtures
-
-_SCRIPT = pathlib.Path(command.__file__).with_name("sweep.py")
+from lfgp_dmc.launch import sweep, sweep_jobs
 
 
 class FakeEngine:
@@ -108,6 +101,16 @@ class SweepTest(absltest.TestCase):
     self.assertEqual(by_name["lfgp_stack_1"]["message"],
                      "killed by SIGKILL")  # fmt: skip
 
+  def test_a_lock_not_released_yet_is_tried_again_after_a_rest(self):
+    jobs = self._jobs(("lfgp_move_object",))
+    engine = FakeEngine({"lfgp_move_object_0": [-9, 1, 0]})
+    start = time.monotonic()
+    with mock.patch.object(sweep, "_REST", 0.5):
+      states = self._run(jobs, engine, restarts=2)
+    self.assertEqual(states, {"lfgp_move_object_0": "done"})
+    self.assertLen(engine.started, 3)
+    self.assertGreater(time.monotonic() - start, 0.5)
+
   def test_a_transfer_waits_for_its_source(self):
     start = "lfgp_transfer_stack:lfgp_move_object:config.from"
     algorithms = ("lfgp_transfer", "lfgp_move_object")
@@ -150,114 +153,6 @@ class SweepTest(absltest.TestCase):
     self.assertIn("--resume", again[0].train_arguments())
     row = csv_files.read(index)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
-
-
-class CommandTest(absltest.TestCase):
-  """The command itself, on the toy environment."""
-
-  def setUp(self):
-    super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-    dataset = fixtures.write_dataset(self.folder / "data")
-    flags = self.folder / "flags"
-    flags.mkdir()
-    lines = [
-      "--config.algorithm=lfgp",
-      f"--config.demonstrations={dataset}",
-      f"--config.environment={fixtures.POINT}",
-      "--config.agent.batch_size=8",
-      "--config.agent.networks.hidden_size=16",
-      "--config.agent.reward.batch_size=8",
-      "--config.agent.scheduler.xi=5",
-      "--config.episode_steps=20",
-      "--config.warm_up=20",
-      "--config.checkpoint_every=40",
-      "--config.env_steps=3000",
-      "--config.updates_per_step=0.1",
-      "--config.evaluate_every=3000",
-      "--config.evaluation_episodes=2",
-      "--config.evaluation_workers=1",
-      "--config.replay_capacity=100000",
-    ]
-    (flags / "lfgp.flags").write_text("\n".join(lines))
-
-  def _start(self, *arguments) -> subprocess.Popen:
-    return subprocess.Popen(
-      [
-        sys.executable,
-        _SCRIPT,
-        "--flagfiles=flags",
-        "--main_tasks=right",
-        "--runs=runs",
-        "--seeds=0",
-        "--workers=1",
-        *arguments,
-      ],
-      cwd=self.folder,
-      stdout=subprocess.PIPE,
-      stderr=subprocess.PIPE,
-      text=True,
-    )
-
-  def _call(self, *arguments) -> subprocess.CompletedProcess:
-    running = self._start(*arguments)
-    output, errors = running.communicate(timeout=120)
-    return subprocess.CompletedProcess([], running.returncode, output, errors)
-
-  def _index(self) -> dict[str, dict[str, str]]:
-    rows = csv_files.read(self.folder / "runs" / "index.csv")[1]
-    return {row["name"]: row for row in rows}
-
-  def test_stops_with_a_checkpoint_goes_on_and_then_skips(self):
-    listed = self._call("--algorithms=lfgp,dac", "--dry_run")
-    self.assertIn("2 runs: 1 waiting, 1 no flagfile", listed.stdout)
-    self.assertFalse((self.folder / "runs").exists())
-    running = self._start("--algorithms=lfgp,dac")
-    run = self.folder / "runs" / "lfgp_right_0"
-    log = run.with_name("lfgp_right_0.log")
-    _wait_for((run / "metrics.csv").exists)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=60)
-    self.assertEqual(running.returncode, command.INTERRUPTED, errors)
-    row = self._index()["lfgp_right_0"]
-    self.assertEqual(row["state"], "stopped")
-    self.assertGreater(float(row["wall_s"]), 0)
-    self.assertNotEmpty(os.listdir(run / "checkpoints"))
-    self.assertIn("stopped at", log.read_text())
-    done = self._call()
-    self.assertEqual(done.returncode, 0, done.stderr)
-    self.assertIn("success after 3000", log.read_text())
-    row = self._index()["lfgp_right_0"]
-    self.assertEqual((row["state"], row["env_step"]), ("done", "3000"))
-    self.assertNotEmpty(row["success"])
-    again = self._call()
-    self.assertEqual(again.returncode, 0)
-    self.assertNotIn("started", again.stdout)
-
-  def test_bad_input_is_told(self):
-    for arguments, message in (
-      (["--seeds=a"], "--seeds: invalid literal"),
-      (["--algorithms=sorcery"], "none of these runs has a flagfile"),
-      (["--start_from=a"], "valid: TARGET:SOURCE"),
-    ):
-      done = self._call(*arguments)
-      self.assertEqual(done.returncode, 1)
-      self.assertIn(message, done.stderr)
-      self.assertNotIn("Traceback", done.stderr)
-
-  def test_trains_on_a_local_ray(self):
-    if not importlib.util.find_spec("ray"):
-      self.skipTest("the extra ray is not installed")
-    done = self._call("--engine=ray", "--train=--config.env_steps=60")
-    self.assertEqual(done.returncode, 0, done.stderr)
-    self.assertEqual(self._index()["lfgp_right_0"]["state"], "done")
-
-
-def _wait_for(condition, seconds: float = 60) -> None:
-  end = time.monotonic() + seconds
-  while not condition():
-    assert time.monotonic() < end, "waited too long"
-    time.sleep(0.1)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,115 @@
+"""Evaluation: the same rows whatever the workers, and its files."""
+
+import functools
+import os
+import pathlib
+
+import numpy as np
+from absl.testing import absltest
+
+from lfgp_dmc import toy
+from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
+
+_ROWS = [
+  EvaluationRow(1000, "right", 0, 7, 1, 4, 2.5),
+  EvaluationRow(1000, "right", 1, 7, 0, None, 0.1),
+  EvaluationRow(1000, "left", 0, 7, None, None, -3.0),
+]
+
+
+class _Seeded(toy.PointEnvironment):
+  """An environment that is seeded when built, as most are."""
+
+  reseed = property()  # hasattr says no
+
+
+def _evaluate(make=toy.PointEnvironment, **options):
+  return evaluation.evaluate(
+    make,
+    toy.WalkingActor,
+    options.pop("tasks", toy.TASKS),
+    episodes=3,
+    seed=options.pop("seed", 7),
+    progress=False,
+    **options,
+  )
+
+
+class EvaluateTest(absltest.TestCase):
+  def test_one_row_an_episode_task_by_task(self):
+    rows = _evaluate(env_step=360)
+    self.assertEqual(
+      [(row.task, row.episode) for row in rows],
+      [(task, i) for task in toy.TASKS for i in range(3)],
+    )
+    for row in rows:
+      self.assertEqual((row.env_step, row.seed, row.success), (360, 7, 1))
+      self.assertBetween(row.steps_to_success, 2, 6)
+      self.assertLess(row.episode_return, 20)  # all 20 steps, at most 1 each
+      self.assertGreater(row.episode_return, 12)
+
+  def test_workers_change_nothing(self):
+    before = dict(os.environ)
+    self.assertEqual(_evaluate(workers=2), _evaluate(workers=1))
+    self.assertEqual(dict(os.environ), before)
+
+  def test_an_episode_depends_on_seed_and_number_alone(self):
+    both, left = _evaluate(), _evaluate(tasks=("left",))
+    self.assertEqual(both[3:], left)
+    self.assertNotEqual(_evaluate(seed=8), both)
+
+  def test_environments_without_reseed_are_built_anew(self):
+    rows = _evaluate(_Seeded)
+    self.assertEqual(rows, _evaluate(_Seeded))
+    self.assertLen({row.episode_return for row in rows}, 6)
+
+  def test_a_physics_failure_is_a_failed_episode(self):
+    make = functools.partial(toy.PointEnvironment, fail_every=2)
+    with self.assertLogs(level="WARNING"):
+      rows = _evaluate(make, tasks=("right",))
+    self.assertEqual([row.success for row in rows], [1, 0, 1])
+    self.assertIsNone(rows[1].steps_to_success)
+
+
+class FilesTest(absltest.TestCase):
+  def test_round_trip_and_append(self):
+    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
+    evaluation_csv.append_csv(path, _ROWS)
+    evaluation_csv.append_csv(path, _ROWS[:1])
+    self.assertEqual(evaluation_csv.read_csv(path), [*_ROWS, _ROWS[0]])
+    lines = path.read_text().splitlines()
+    self.assertEqual(
+      lines[0], "env_step,task,episode,seed,success,steps_to_success,return"
+    )
+    self.assertEqual(lines[2], "1000,right,1,7,0,,0.1")
+
+  def test_another_csv_is_refused(self):
+    path = pathlib.Path(self.create_tempdir().full_path) / "a.csv"
+    path.write_text("env_step\n1\n")
+    with self.assertRaisesRegex(ValueError, "a.csv is no evaluation"):
+      evaluation_csv.read_csv(path)
+
+  def test_table(self):
+    lines = evaluation_csv.success_table(_ROWS).splitlines()
+    self.assertEqual(lines[1].split(), ["right", "50.0%", "2", "4.0", "1.30"])
+    self.assertEqual(lines[2].split(), ["left", "-", "1", "-", "-3.00"])
+    self.assertEqual(evaluation_csv.success_rates(_ROWS)["right"], 0.5)
+
+
+class EnvironmentsTest(absltest.TestCase):
+  def test_widths_leave_task_observables_out(self):
+    self.assertEqual(environments.widths(toy.PointEnvironment()), (2, 2))
+
+  def test_rewards_by_task_or_the_environments_own(self):
+    environment = toy.PointEnvironment()
+    environment.reset()
+    timestep = environment.step(np.zeros(2))
+    rewards = environments.task_rewards(timestep, ("right", "left", "other"))
+    self.assertEqual(rewards[2], rewards[0])
+    self.assertAlmostEqual(float(rewards[0] + rewards[1]), 0.4, places=5)
+
+
+if __name__ == "__main__":
+  absltest.main()

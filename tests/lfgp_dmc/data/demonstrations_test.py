@@ -1,0 +1,171 @@
+"""Demonstrations: round trip, atomic writing, and every fault by name."""
+
+import dataclasses
+import pathlib
+from unittest import mock
+
+import h5py
+import numpy as np
+from absl.testing import absltest, parameterized
+
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data.demonstrations import DatasetError
+from tests import fixtures
+
+_DATA = fixtures.demonstrations(3, 3)
+
+# A fault of the arrays: what replaces which array, and what is said of it.
+_FAULTS = {
+  "shape": ("action", lambda a: a[:, :1], r"'action' has shape \[6, 1\]"),
+  "rows": ("episode", lambda a: a[:-1], r"'episode' has shape \[5\]"),
+  "dtype": ("action", np.float64, "'action' is float64; valid: float32"),
+  "nan": (
+    "observation",
+    lambda a: np.where(a == a[2], np.float32(np.nan), a),
+    "NaN or infinity in 1 rows, first in row 2",
+  ),
+  "range": ("action", lambda a: a * 3, r"'action' leaves \[-1, 1\]"),
+  "empty": ("observation", lambda a: a[:0], "holds no pair"),
+  "decreasing": ("episode", lambda a: a[::-1].copy(), "decreases"),
+  "inside": ("is_last", np.ones_like, "true inside an episode"),
+}
+_BAD_ATTRIBUTES = {
+  "task": ("lift", "task is 'lift'; expected 'reach'"),
+  "collection": ("dream", "collection is 'dream'; valid: reset, play"),
+  "seed": (-1, "seed is -1"),
+  "control_hz": (0.0, "control_hz is 0.0"),
+  "schema_version": (9, "schema_version is 9; valid: 1"),
+}
+
+
+class DemonstrationsTest(fixtures.FolderTest):
+  def setUp(self):
+    super().setUp()
+    self._path = self.folder / "reach.hdf5"
+
+  def _write(self, task: str = "reach") -> pathlib.Path:
+    path = self.folder / f"{task}.hdf5"
+    attributes = {**fixtures.ATTRIBUTES, "task": task}
+    demonstrations.write(path, _DATA, attributes)
+    return path
+
+  def _replace(self, name: str, array: np.ndarray) -> None:
+    with h5py.File(self._path, "r+") as file:
+      del file[name]
+      file[name] = array
+
+  def _read_error(self) -> str:
+    with self.assertRaises(DatasetError) as caught:
+      demonstrations.read_folder(self.folder, ("reach",), 5, 2)
+    lines = str(caught.exception).splitlines()
+    self.assertLen(lines, 2)
+    self.assertStartsWith(lines[1], str(self._path))
+    return lines[1]
+
+  def test_round_trip(self):
+    self._write()
+    read = demonstrations.read(self._path, "reach", 5, 2)
+    for name, array in _DATA.arrays().items():
+      np.testing.assert_array_equal(getattr(read, name), array)
+      self.assertEqual(getattr(read, name).dtype, array.dtype)
+    self.assertEqual(
+      dict(read.attributes), {**fixtures.ATTRIBUTES, "schema_version": 1}
+    )
+    self.assertLen(read.head(4), 4)
+
+  def test_the_same_data_are_the_same_bytes(self):
+    self._write()
+    first = self._path.read_bytes()
+    self._path.unlink()
+    self._write()
+    self.assertEqual(self._path.read_bytes(), first)
+
+  def test_an_interrupted_write_leaves_nothing(self):
+    interrupt = mock.patch.object(
+      h5py.Group, "create_dataset", side_effect=KeyboardInterrupt
+    )
+    with interrupt, self.assertRaises(KeyboardInterrupt):
+      self._write()
+    self.assertEmpty(list(self.folder.iterdir()))
+
+  def test_nothing_is_overwritten(self):
+    self._write()
+    with self.assertRaises(FileExistsError):
+      self._write()
+    with self.assertRaisesRegex(FileExistsError, "never written into"):
+      demonstrations.create_folder(self.folder)
+    new = demonstrations.create_folder(self.folder / "a" / "b")
+    self.assertTrue(new.is_dir())
+
+  def test_bad_data_are_not_written(self):
+    bad = dataclasses.replace(_DATA, action=np.full((6, 2), 2, np.float32))
+    with self.assertRaisesRegex(DatasetError, "not written: 'action'"):
+      demonstrations.write(self._path, bad, fixtures.ATTRIBUTES)
+    self.assertFalse(self._path.exists())
+
+  @parameterized.named_parameters((k, *v) for k, v in _FAULTS.items())
+  def test_fault_of_an_array(self, name, change, message):
+    self._write()
+    self._replace(name, change(getattr(_DATA, name)))
+    self.assertRegex(self._read_error(), message)
+
+  @parameterized.named_parameters(
+    (k, k, *v) for k, v in _BAD_ATTRIBUTES.items()
+  )
+  def test_fault_of_an_attribute(self, name, value, message):
+    self._write()
+    with h5py.File(self._path, "r+") as file:
+      file.attrs[name] = value
+    self.assertIn(message, self._read_error())
+
+  def test_missing_key_and_missing_attribute(self):
+    self._write()
+    with h5py.File(self._path, "r+") as file:
+      del file["is_last"]
+      del file.attrs["expert"]
+    line = self._read_error()
+    self.assertIn("missing dataset 'is_last'", line)
+    self.assertIn("missing attribute 'expert'", line)
+
+  def test_wrong_width(self):
+    self._write()
+    with self.assertRaisesRegex(DatasetError, r"valid: \[6, 59\]"):
+      demonstrations.read(self._path, "reach", 59, 2)
+
+  @parameterized.parameters(0, 10, 900, 0.5, 0.9)
+  def test_truncated_file(self, length):
+    path = self._write()
+    content = path.read_bytes()
+    if isinstance(length, float):
+      length = int(len(content) * length)
+    path.write_bytes(content[:length])
+    self.assertIn("not a readable HDF5 file", self._read_error())
+
+  def test_every_fault_of_the_folder_damaged_first(self):
+    for task in ("reach", "lift", "stack"):
+      self._write(task)
+    (self.folder / "lift.hdf5").write_bytes(b"no")
+    self._replace("is_last", np.zeros(2, bool))
+    tasks = ("move_object", "stack", "reach", "lift", "bring")
+    with self.assertRaises(DatasetError) as caught:
+      demonstrations.read_folder(self.folder, tasks, 5, 2)
+    lines = str(caught.exception).splitlines()[1:]
+    order = [line.partition(": ")[0].rpartition("/")[2] for line in lines]
+    self.assertEqual(
+      order, ["reach.hdf5", "lift.hdf5", "move_object.hdf5", "bring.hdf5"]
+    )
+    self.assertEndsWith(lines[-1], "missing")
+
+  def test_no_folder(self):
+    with self.assertRaisesRegex(DatasetError, "no dataset folder.*reach.hdf5"):
+      demonstrations.read_folder(self.folder / "none", ("reach",))
+
+  def test_summary(self):
+    table = demonstrations.summary_table({"reach": _DATA})
+    header, row = table.splitlines()
+    self.assertIn("episodes", header)
+    self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])
+
+
+if __name__ == "__main__":
+  absltest.main()

@@ -1,0 +1,111 @@
+"""Demonstrations to Minari and back."""
+
+import importlib.util
+import os
+import pathlib
+import subprocess
+import sys
+import unittest
+from unittest import mock
+
+import numpy as np
+from absl.testing import absltest
+
+from lfgp_dmc.data import demonstrations
+from lfgp_dmc.launch import command
+
+if not importlib.util.find_spec("minari"):
+  raise unittest.SkipTest("the extra minari is not installed")
+
+import gymnasium
+import minari
+from minari import data_collector
+
+from lfgp_dmc.data import minari_datasets
+from tests import fixtures
+
+
+class MinariTest(fixtures.FolderTest):
+  def setUp(self):
+    super().setUp()
+    self.enter_context(
+      mock.patch.dict(
+        os.environ, {"MINARI_DATASETS_PATH": str(self.folder / "minari")}
+      )
+    )
+
+  def test_comes_back_as_it_went(self):
+    data = fixtures.demonstrations(4, 1, 6)
+    stored = minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
+    self.assertEqual((stored.total_episodes, stored.total_steps), (3, 11))
+    first, _, last = list(minari.load_dataset("lfgp_dmc/a/reach-v0"))
+    self.assertEqual(first.observations.shape, (5, 5))
+    self.assertTrue(first.terminations[-1])
+    self.assertTrue(last.truncations[-1])
+    back = minari_datasets.from_minari("lfgp_dmc/a/reach-v0")
+    for name, array in data.arrays().items():
+      np.testing.assert_array_equal(back.arrays()[name], array, name)
+      self.assertEqual(back.arrays()[name].dtype, array.dtype)
+    self.assertEqual(back.attributes, fixtures.ATTRIBUTES)
+    demonstrations.write(self.folder / "reach.hdf5", back)
+    with self.assertRaisesRegex(ValueError, "exists; choose another"):
+      minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
+
+  def test_what_does_not_fit_is_named(self):
+    data = fixtures.demonstrations(4, 1, 6)
+    data.observation[2] += 1
+    with self.assertRaisesRegex(ValueError, "row 2 does not start where"):
+      minari_datasets.to_minari(data, "a-v0")
+    with self.assertRaisesRegex(ValueError, "no local Minari dataset a-v0"):
+      minari_datasets.from_minari("a-v0")
+    buffer = data_collector.EpisodeBuffer(
+      observations=np.zeros(3, np.int64),
+      actions=np.zeros((2, 1), np.float32),
+      rewards=[0, 0],
+      terminations=[False, True],
+      truncations=[False, False],
+    )
+    minari.create_dataset_from_buffers(
+      "b-v0",
+      [buffer],
+      observation_space=gymnasium.spaces.Discrete(4),
+      action_space=gymnasium.spaces.Box(-1, 1, (1,)),
+      description="Not ours.",
+    )
+    with self.assertRaisesRegex(ValueError, "is Discrete.*valid: a flat Box"):
+      minari_datasets.from_minari("b-v0")
+
+  def test_the_command_converts_folders(self):
+    ours = self.folder / "ours"
+    ours.mkdir()
+    demonstrations.write(ours / "reach.hdf5", fixtures.demonstrations(4, 1, 6))
+    script = pathlib.Path(command.__file__).with_name("convert_minari.py")
+    for arguments, said in (
+      (["--dataset=ours", "--minari=lfgp_dmc/b"], "lfgp_dmc/b/reach-v0"),
+      (
+        [
+          "--dataset=new",
+          "--minari=lfgp_dmc/b",
+          "--back",
+          "--attributes=expert=me,seed=9",
+        ],
+        "new/reach.hdf5",
+      ),
+    ):
+      done = subprocess.run(
+        [sys.executable, script, *arguments],
+        cwd=self.folder,
+        capture_output=True,
+        text=True,
+        check=False,
+      )
+      self.assertEqual(done.returncode, 0, done.stderr)
+      self.assertIn(said, done.stdout)
+    back = demonstrations.read(self.folder / "new" / "reach.hdf5", "reach")
+    self.assertLen(back, 11)
+    self.assertEqual((back.attributes["expert"], back.attributes["seed"]),
+                     ("me", 9))  # fmt: skip
+
+
+if __name__ == "__main__":
+  absltest.main()

@@ -1,0 +1,112 @@
+"""Checkpoints: round trip, thinning, damage, interruption."""
+
+import pathlib
+from unittest import mock
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+from lfgp_dmc.runs import checkpoints, pytree
+from tests import fixtures
+
+_STATE = {
+  "agent": {
+    "weights": np.arange(6, dtype=np.float32).reshape(2, 3).T,
+    "optimizer": {0: {"step": np.asarray(3, np.int64)}, 1: [np.ones(2), None]},
+    "mask": np.array([True, False]),
+    "random": np.random.default_rng(0).bit_generator.state,
+  },
+  "progress": {"env_step": 360, "rate": 0.5, "name": "lfgp", "done": False},
+}
+
+
+class CheckpointsTest(fixtures.FolderTest):
+  def setUp(self):
+    super().setUp()
+    self._folder = self.folder / "checkpoints"
+
+  def _save(self, *steps: int, run_steps=None):
+    for step in steps:
+      checkpoints.save(self._folder, step, {"step": step}, run_steps)
+
+  def _steps(self) -> list[int]:
+    return [int(path.name) for path in checkpoints.every(self._folder)]
+
+  def test_round_trip(self):
+    path = checkpoints.save(self._folder, 360, _STATE)
+    read = checkpoints.load(path)
+    agent = read["agent"]
+    np.testing.assert_array_equal(
+      agent["weights"], _STATE["agent"]["weights"], strict=True
+    )
+    self.assertEqual(agent["optimizer"][0]["step"].shape, ())
+    self.assertEqual(agent["optimizer"][0]["step"].dtype, np.int64)
+    np.testing.assert_array_equal(agent["optimizer"][1][0], np.ones(2))
+    self.assertIsNone(agent["optimizer"][1][1])
+    self.assertEqual(agent["mask"].tolist(), [True, False])
+    self.assertEqual(agent["random"], _STATE["agent"]["random"])
+    self.assertEqual(read["progress"], _STATE["progress"])
+
+  def test_the_last_three_and_one_per_tenth_are_kept(self):
+    self._save(*range(50, 1001, 50), run_steps=1000)
+    tenths = list(range(100, 1001, 100))
+    self.assertEqual(self._steps(), sorted({*tenths, 900, 950, 1000}))
+
+  def test_only_the_last_three_without_a_length(self):
+    self._save(1, 2, 3, 4, 5)
+    self.assertEqual(self._steps(), [3, 4, 5])
+
+  @parameterized.parameters("arrays.safetensors", "state.json", "manifest.json")
+  def test_a_truncated_newest_falls_back(self, name):
+    checkpoints.save(self._folder, 1, _STATE)
+    newest = checkpoints.save(self._folder, 2, _STATE)
+    content = (newest / name).read_bytes()
+    (newest / name).write_bytes(content[: len(content) // 2])
+    with self.assertLogs(level="WARNING") as logs:
+      path = checkpoints.latest(self._folder)
+    self.assertEqual(path.name, "000000001")
+    self.assertIn(str(newest / name), logs.output[0])
+    with self.assertRaises(checkpoints.CheckpointError):
+      checkpoints.load(newest)
+
+  def test_an_altered_or_missing_file_is_damage(self):
+    path = checkpoints.save(self._folder, 1, _STATE)
+    content = bytearray((path / "arrays.safetensors").read_bytes())
+    content[-1] ^= 1
+    (path / "arrays.safetensors").write_bytes(content)
+    with self.assertRaises(checkpoints.CheckpointError):
+      checkpoints.load(path)
+    (path / "arrays.safetensors").unlink()
+    with self.assertRaises(checkpoints.CheckpointError):
+      checkpoints.load(path)
+
+  def test_none_is_none(self):
+    self.assertIsNone(checkpoints.latest(self._folder))
+
+  def test_a_failed_save_leaves_the_earlier_ones(self):
+    self._save(1)
+    full = mock.patch.object(
+      pathlib.Path, "write_text", side_effect=OSError(28, "No space left")
+    )
+    with full, self.assertRaisesRegex(OSError, "No space"):
+      self._save(2)
+    self.assertEqual([p.name for p in self._folder.iterdir()], ["000000001"])
+
+  def test_what_a_killed_process_left_is_cleared(self):
+    self._save(1)
+    (self._folder / ".partial-000000002").mkdir()
+    self._save(3)
+    self.assertLen(list(self._folder.iterdir()), 2)
+
+  def test_a_step_can_be_saved_again(self):
+    self._save(1)
+    path = checkpoints.save(self._folder, 1, {"step": "again"})
+    self.assertEqual(checkpoints.load(path), {"step": "again"})
+
+  def test_what_cannot_be_stored_is_named(self):
+    with self.assertRaisesRegex(TypeError, "'agent/0' is a set"):
+      pytree.pack({"agent": [set()]})
+
+
+if __name__ == "__main__":
+  absltest.main()
