@@ -21,7 +21,7 @@ Metrics = dict[str, torch.Tensor]
 
 
 class DiscriminatorRewards(RewardSource):
-  """The discriminators of all tasks: one network, or the main task's apart."""
+  """The discriminators of all tasks: one network, or a separate one for the main task."""
 
   def __init__(
     self,

@@ -20,7 +20,7 @@ _Network = TypeVar("_Network", bound=nn.Module)
 
 @dataclasses.dataclass
 class LfgpNetworks:
-  """What the learner trains; with a shared trunk, intentions' = critics'."""
+  """All networks; a shared trunk is one module in intentions and critics."""
 
   intentions: IntentionNetwork
   critics: CriticNetwork
@@ -29,7 +29,7 @@ class LfgpNetworks:
   discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
   prior: IntentionNetwork | None = None  # the first intentions, frozen
-  main_discriminator: Discriminator | None = None  # the main task's, if apart
+  main_discriminator: Discriminator | None = None  # the main task's, if separate
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
@@ -112,7 +112,7 @@ def _make_discriminators(
 
   if not config.main_masked:
     return None, make(tasks, config.masked)
-  if tasks == 1:  # there are no others to be apart from
+  if tasks == 1:  # there are no others
     return None, make(1, config.main_masked)
   return make(1, config.main_masked), make(tasks - 1, config.masked)
 

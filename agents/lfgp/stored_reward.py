@@ -10,7 +10,7 @@ from lfgp_dmc.types import Episode
 
 
 class StoredRewards(RewardSource):
-  """Takes what each batch brings along."""
+  """Labels rows with their stored rewards."""
 
   def __init__(self, config: StoredReward, main_column: int):
     """Keeps the settings.
