@@ -21,7 +21,7 @@ Metrics = dict[str, torch.Tensor]
 
 
 class DiscriminatorRewards(RewardSource):
-  """The discriminators of all tasks: one network, or a separate one for the main task."""
+  """The discriminators of all tasks; the main task may have its own network."""
 
   def __init__(
     self,

@@ -25,11 +25,11 @@ class LfgpNetworks:
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  # Of all tasks, or of all but the main task; None: no reward comes from it.
+  # Of all tasks, or of all but the main; None: no reward comes from it.
   discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
   prior: IntentionNetwork | None = None  # the first intentions, frozen
-  main_discriminator: Discriminator | None = None  # the main task's, if separate
+  main_discriminator: Discriminator | None = None  # the main task's own
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""

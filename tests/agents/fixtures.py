@@ -93,7 +93,6 @@ def make_learner(
   observations: int = OBS,
   actions: int = A,
   dtype: torch.dtype = torch.float32,
-  recorder=None,
   **fields: Any,
 ):
   """Networks and their learner without data; `fields`: of `config`."""
@@ -107,7 +106,7 @@ def make_learner(
     torch.device("cpu"),
   )
   noise = torch.Generator().manual_seed(2)
-  return build_learner(settings, networks, noise, dtype, recorder)
+  return build_learner(settings, networks, noise, dtype)
 
 
 def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
