@@ -6,45 +6,59 @@ import numpy as np
 import torch
 
 from lfgp_dmc.agents.batches import Batch, ExpertBatch
+from lfgp_dmc.agents.fields import InputsConfig
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data.demonstrations import Demonstrations
 
 
-def pooled_observations(
-  demonstrations: Mapping[str, Demonstrations], tasks: Sequence[str]
-) -> np.ndarray:
-  """All tasks' observations, [sum of N, O].
-
-  Raises:
-    ValueError: a task has no demonstrations; the message lists all such.
-  """
-  missing = [
-    task
-    for task in tasks
-    if task not in demonstrations or not len(demonstrations[task].action)
-  ]
-  if missing:
-    raise ValueError(f"no demonstrations of {', '.join(missing)}")
-  return np.concatenate([demonstrations[task].observation for task in tasks])
-
-
-def check_sizes(
-  demonstrations: Mapping[str, Demonstrations],
+def make_standardiser(
+  config: InputsConfig,
+  demonstrations: Mapping[str, Demonstrations] | None,
   tasks: Sequence[str],
   observation_size: int,
   action_size: int,
-) -> None:
-  """Raises ValueError unless all are of the environment's sizes."""
+) -> Standardiser:
+  """Checks the demonstrations, and fits the standardiser if configured.
+
+  Args:
+    config: of the inputs.
+    demonstrations: by task; None: none are used.
+    tasks: the K tasks.
+    observation_size: O of the environment.
+    action_size: A of the environment.
+
+  Raises:
+    ValueError: a task has no demonstrations, or they are of other sizes.
+  """
+  standardiser = Standardiser(observation_size, config.tanh_feature_scale)
+  if demonstrations is None:
+    return standardiser
+  observation = _pooled(demonstrations, tasks)
   for task in tasks:
-    sizes = (
-      demonstrations[task].observation.shape[1],
-      demonstrations[task].action.shape[1],
-    )
+    part = demonstrations[task]
+    sizes = (part.observation.shape[1], part.action.shape[1])
     if sizes != (observation_size, action_size):
       raise ValueError(
         f"demonstrations of {task}: observation and action have {sizes} "
         f"floats; the environment has {(observation_size, action_size)}"
       )
+  if config.standardise:
+    standardiser.fit(observation)
+  return standardiser
+
+
+def _pooled(
+  demonstrations: Mapping[str, Demonstrations], tasks: Sequence[str]
+) -> np.ndarray:
+  """All tasks' observations, [sum of N, O]."""
+  missing = [
+    task
+    for task in tasks
+    if task not in demonstrations or not len(demonstrations[task])
+  ]
+  if missing:
+    raise ValueError(f"no demonstrations of {', '.join(missing)}")
+  return np.concatenate([demonstrations[task].observation for task in tasks])
 
 
 class ExpertPool:
@@ -66,7 +80,7 @@ class ExpertPool:
     Raises:
       ValueError: a task has no demonstrations.
     """
-    observation = pooled_observations(demonstrations, tasks)
+    observation = _pooled(demonstrations, tasks)
     parts = [demonstrations[task] for task in tasks]
     device = standardiser.mean.device
 

@@ -4,12 +4,15 @@ A config is a frozen dataclass of groups; pydantic checks each field, strictly,
 where it is declared.
 """
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeVar, dataclass_transform
 
+import pydantic
 import pydantic.dataclasses
 from pydantic import AfterValidator, ConfigDict, Field
 
 _Config = TypeVar("_Config")
+_SAYS = "Input should be "  # how pydantic starts what is valid
 
 PositiveInt = Annotated[int, Field(strict=True, ge=1)]
 Count = Annotated[int, Field(strict=True, ge=0)]
@@ -30,6 +33,39 @@ def checked(kind: type[_Config]) -> type[_Config]:
     kind, frozen=True, kw_only=True, config=ConfigDict(extra="forbid")
   )
   return made
+
+
+def faults(
+  error: pydantic.ValidationError, values: Mapping[str, Any], prefix: str
+) -> list[str]:
+  """What is wrong, such as "config.agent.scheduler.xi is 0; valid: ...".
+
+  Args:
+    error: raised by a `checked` class.
+    values: what it was made of.
+    prefix: of all names.
+  """
+  return [_fault(fault, values, prefix) for fault in error.errors()]
+
+
+def _fault(fault: Any, values: Mapping[str, Any], prefix: str) -> str:
+  says = fault["msg"].removeprefix("Value error, ").removeprefix(_SAYS)
+  if not fault["loc"]:  # of fields together: they are named already
+    return "\n".join(f"{prefix}.{line}" for line in says.split("\n"))
+  name, within = prefix, values
+  for part in fault["loc"]:
+    if part in within:  # else the kind of a group
+      name, within = f"{name}.{part}", within[part]
+      within = within if isinstance(within, Mapping) else {}
+  match fault["type"]:
+    case "missing":
+      return f"{name}.{fault['loc'][-1]} is missing"
+    case "unexpected_keyword_argument":
+      return f"unknown {name}"
+    case "union_tag_invalid":
+      tag, tags = fault["ctx"]["tag"], fault["ctx"]["expected_tags"]
+      return f"{name}.kind is {tag!r}; valid: {tags}"
+  return f"{name} is {fault['input']!r}; valid: {says}"
 
 
 def positions(slices: str) -> tuple[int, ...]:

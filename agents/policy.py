@@ -4,23 +4,33 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+import pydantic
 import safetensors
 import safetensors.numpy
 import torch
+from pydantic import Field
 
-from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents import fields, serialisation
+from lfgp_dmc.agents.fields import NetworksConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.data import files
+from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
 
-ARRAYS_FILE = "policy.safetensors"
-CONFIG_FILE = "config.json"
-# Under this key of `config.json` are the options of `Policy.from_arrays`.
-CONFIG_KEY = "policy"
-_SIZES = ("observation_size", "action_size", "hidden_size")
+
+@fields.checked
+class PolicyOptions(NetworksConfig):
+  """What goes with a policy's arrays."""
+
+  tasks: Annotated[list[fields.Text], Field(min_length=1)]
+  observation_size: fields.PositiveInt
+  action_size: fields.PositiveInt
+  tanh_feature_scale: fields.NonNegative = 0.0
+  env_step: fields.Count = 0  # how long it was trained
 
 
 class Policy:
@@ -54,14 +64,11 @@ class Policy:
   def from_arrays(
     cls, arrays: Mapping[str, np.ndarray], options: Mapping[str, Any]
   ) -> "Policy":
-    """Builds a policy from what an agent's `policy_arrays` returned.
+    """Builds a policy from what `arrays` and `options` of another returned.
 
     Args:
       arrays: name -> array.
-      options: `tasks` (list of str), `observation_size`, `action_size`,
-        `hidden_size` (int), `layout` (of `networks/layouts.py`; missing: a
-        shared trunk), `tanh_feature_scale` (missing: 0): an agent's
-        `policy_options`.
+      options: the fields of `PolicyOptions`.
 
     Returns:
       The policy, on the CPU.
@@ -70,30 +77,21 @@ class Policy:
       ValueError: an option is missing or wrong, or the arrays do not fit;
         the message lists each fault.
     """
-    faults = [
-      f"{name} is {options.get(name)!r}; valid: an integer above 0"
-      for name in _SIZES
-      if not isinstance(options.get(name), int) or options[name] < 1
-    ]
-    tasks = options.get("tasks")
-    if not isinstance(tasks, list | tuple) or not tasks:
-      faults.append(f"tasks is {tasks!r}; valid: a list of task names")
-    layout = options.get("layout", layouts.SHARED_TRUNK)
-    if layout not in layouts.LAYOUTS:
-      faults.append(
-        f"layout is {layout!r}; valid: {', '.join(layouts.LAYOUTS)}"
-      )
-    if faults:
-      raise ValueError(f"policy options: {'; '.join(faults)}")
-    assert tasks is not None
-    observations, actions, hidden = (options[name] for name in _SIZES)
-    scale = float(options.get("tanh_feature_scale", 0.0))
-    standardiser = Standardiser(observations, scale)
+    try:
+      checked = PolicyOptions(**options)
+    except pydantic.ValidationError as error:
+      faults = fields.faults(error, options, POLICY_FIELD)
+      raise ValueError("; ".join(faults)) from None
     network = layouts.make_intentions(
-      layout, standardiser, len(tasks), hidden, actions, torch.Generator()
+      checked.layout,
+      Standardiser(checked.observation_size, checked.tanh_feature_scale),
+      len(checked.tasks),
+      checked.hidden_size,
+      checked.action_size,
+      torch.Generator(),
     )
     serialisation.load_module_state(network, arrays, "policy arrays")
-    return cls(network.requires_grad_(False), tasks)
+    return cls(network.requires_grad_(False), checked.tasks)
 
   @classmethod
   def load(cls, folder: str | os.PathLike[str]) -> "Policy":
@@ -103,19 +101,19 @@ class Policy:
       FileNotFoundError: a file is missing; the message names it.
       ValueError: a file is damaged; the message names it and the fault.
     """
-    config_path = Path(folder) / CONFIG_FILE
-    arrays_path = Path(folder) / ARRAYS_FILE
+    config_path = Path(folder) / CONFIG_NAME
+    arrays_path = Path(folder) / ARRAYS_NAME
     for path in (config_path, arrays_path):
       if not path.is_file():
         raise FileNotFoundError(f"no policy in {folder}: {path} is missing")
     try:
-      options = json.loads(config_path.read_text())[CONFIG_KEY]
+      options = json.loads(config_path.read_text())[POLICY_FIELD]
     except (OSError, ValueError, KeyError, TypeError) as error:
       raise ValueError(
-        f"{config_path}: no policy options under {CONFIG_KEY!r} ({error!r})"
+        f"{config_path}: no policy options under {POLICY_FIELD!r} ({error!r})"
       ) from error
     if not isinstance(options, dict):
-      raise ValueError(f"{config_path}: {CONFIG_KEY!r} is not an object")
+      raise ValueError(f"{config_path}: {POLICY_FIELD!r} is not an object")
     try:
       arrays = safetensors.numpy.load_file(arrays_path)
     except (OSError, safetensors.SafetensorError) as error:
@@ -129,18 +127,23 @@ class Policy:
     self,
     folder: str | os.PathLike[str],
     config: Mapping[str, Any] | None = None,
+    env_step: int = 0,
   ) -> None:
-    """Writes a policy folder.
+    """Writes a policy folder, each file whole or not at all.
 
     Args:
       folder: made if missing.
-      config: what else `config.json` says, such as the run's config.
+      config: what else `config.json` holds, such as the run's config.
+      env_step: how long it was trained.
     """
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    content = {**(config or {}), CONFIG_KEY: self.options()}
-    text = json.dumps(content, indent=2) + "\n"
-    (Path(folder) / CONFIG_FILE).write_text(text)
-    safetensors.numpy.save_file(self.arrays(), Path(folder) / ARRAYS_FILE)
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    with files.replacing(folder / ARRAYS_NAME) as aside:
+      safetensors.numpy.save_file(self.arrays(), aside)
+    options = {**self.options(), "env_step": env_step}
+    files.write_json(
+      folder / CONFIG_NAME, {**(config or {}), POLICY_FIELD: options}
+    )
 
   def arrays(self) -> dict[str, np.ndarray]:
     """Everything acting needs, by name, copied."""

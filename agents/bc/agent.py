@@ -13,15 +13,12 @@ from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.bc.config import BcConfig
 from lfgp_dmc.agents.bc.pairs import SplitPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
-from lfgp_dmc.agents.demonstration_pool import (
-  check_sizes,
-  pooled_observations,
-)
+from lfgp_dmc.agents.demonstration_pool import make_standardiser
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
-from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
 
@@ -128,13 +125,11 @@ class BcAgent:
       row[f"loss_validation/{task}"] = loss
     return row
 
-  def policy_arrays(self) -> dict[str, np.ndarray]:
-    """What acting needs, of the best weights so far."""
-    return self.policy.arrays()
-
-  def policy_options(self) -> dict[str, Any]:
-    """The JSON-able options that go with `policy_arrays`."""
-    return self.policy.options()
+  def save_policy(
+    self, folder: files.Path, config: Mapping[str, Any], env_step: int
+  ) -> None:
+    """Makes a folder the policy folder of the best weights so far."""
+    self.policy.save(folder, config, env_step)
 
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values; taken between epochs."""
@@ -201,13 +196,9 @@ def build(
   """
   del replay, unused
   device = torch.device(device)
-  observation = pooled_observations(demonstrations, tasks)
-  check_sizes(demonstrations, tasks, observation_size, action_size)
-  standardiser = Standardiser(
-    observation_size, config.inputs.tanh_feature_scale
-  )
-  if config.inputs.standardise:
-    standardiser.fit(observation)
+  standardiser = make_standardiser(
+    config.inputs, demonstrations, tasks, observation_size, action_size
+  ).to(device)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   network = layouts.make_intentions(
     config.networks.layout,

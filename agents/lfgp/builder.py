@@ -5,11 +5,7 @@ from collections.abc import Mapping, Sequence
 import torch
 
 from lfgp_dmc import seeding
-from lfgp_dmc.agents.demonstration_pool import (
-  ExpertPool,
-  check_sizes,
-  pooled_observations,
-)
+from lfgp_dmc.agents.demonstration_pool import ExpertPool, make_standardiser
 from lfgp_dmc.agents.lfgp.agent import LfgpAgent
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
 from lfgp_dmc.agents.lfgp.config import (
@@ -28,7 +24,6 @@ from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
 from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards, reward_columns
-from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.schedulers import make_scheduler
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
@@ -70,18 +65,11 @@ def build(
   """
   device = torch.device(device)
   dtype = torch.bfloat16 if bfloat16 else torch.float32
-  standardiser = Standardiser(
-    observation_size, config.inputs.tanh_feature_scale
-  )
-  if config.uses_demonstrations:
-    observation = pooled_observations(demonstrations, tasks)
-    check_sizes(demonstrations, tasks, observation_size, action_size)
-    if config.inputs.standardise:
-      standardiser.fit(observation)
-  standardiser.to(device)
-  experts = None
-  if config.uses_demonstrations:
-    experts = ExpertPool(demonstrations, tasks, standardiser)
+  used = demonstrations if config.uses_demonstrations else None
+  standardiser = make_standardiser(
+    config.inputs, used, tasks, observation_size, action_size
+  ).to(device)
+  experts = ExpertPool(used, tasks, standardiser) if used is not None else None
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
     config, len(tasks), action_size, standardiser, initial, device

@@ -1,9 +1,9 @@
 """On a GPU: an update recorded once, then replayed as one CUDA graph.
 
-An update is some six hundred small operations; a GPU is done with each sooner
-than Python can ask for the next. A recording asks for all of them at once. It
-works on the memory of its recording, so whatever changes from update to update
-has to be a tensor that is written in place, never a Python number.
+An update is some six hundred small kernels, each done before Python has
+launched the next; a graph launches them all at once. It replays on the memory
+of its recording, so whatever changes between updates has to be a tensor that is
+written in place, never a Python number.
 """
 
 import collections
@@ -17,34 +17,24 @@ from lfgp_dmc.agents.batches import Draw
 Metrics = dict[str, torch.Tensor]
 Update = Callable[[], Metrics]
 
-_WARM_UPS = (
-  3  # updates before a recording, in which libraries set themselves up
-)
+_WARM_UPS = 3  # updates before a recording, in which libraries initialise
 
 
 class Recorder(Protocol):
   """Runs and records updates; `CudaRecorder`, or a test's."""
 
   def warm_up(self, update: Update, /) -> Metrics:
-    """Makes an update in the way that recording it later asks for."""
+    """Makes an update as a later recording requires."""
 
   def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
-    """Records an update without making it.
-
-    Returns:
-      Where its metrics will be, and what makes the update.
-    """
+    """Records an update without making it: its metrics, and its replay."""
 
 
 class CudaRecorder:
   """Records on the generator's CUDA device."""
 
   def __init__(self, generator: torch.Generator):
-    """Keeps the one source of random numbers in an update.
-
-    Args:
-      generator: on the device; replays go on with its stream.
-    """
+    """Keeps the one source of random numbers; replays continue its stream."""
     self._generator = generator
     self._stream = torch.cuda.Stream(generator.device)
 
@@ -88,7 +78,7 @@ class RecordedUpdates:
 
     Args:
       update: what to make; the same function in every call.
-      draw: its arguments; their numbers are copied.
+      draw: its argument; the numbers are copied.
       phase: what else decides which operations an update consists of. Each
         phase, with each set of shapes, has a recording of its own.
 
@@ -114,19 +104,16 @@ class RecordedUpdates:
 
 def _tensors(draw: Draw) -> list[torch.Tensor]:
   """All tensors of a draw, always in the same order."""
-  groups = [group for group in draw if group is not None]
-  parts = [part for group in groups for part in group]
-  return [part for part in parts if isinstance(part, torch.Tensor)]
+  parts = [part for group in draw for part in group or ()]
+  return [part for part in parts if part is not None]
 
 
 def _copy(draw: Draw) -> Draw:
   """The same draw in memory of its own."""
 
   def copied(group):
-    if group is None:
-      return None
-    return type(group)(
-      *(p.clone() if isinstance(p, torch.Tensor) else p for p in group)
+    return group and type(group)(
+      *(p if p is None else p.clone() for p in group)
     )
 
   return Draw(*map(copied, draw))

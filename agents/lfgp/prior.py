@@ -33,7 +33,7 @@ class Prior:
     """Keeps the frozen network."""
     self._config = config
     self._network = network
-    self._weight = torch.full((), config.weight, device=device)
+    self._faded = torch.ones((), device=device)
 
   def adopt(self, intentions: IntentionNetwork) -> None:
     """Copies the current intentions into the prior."""
@@ -41,7 +41,7 @@ class Prior:
 
   def fade(self, updates: int) -> None:
     """Sets the weight after so many updates."""
-    self._weight.fill_(self._config.weight * self._config.decay**updates)
+    self._faded.fill_(self._config.decay**updates)
 
   def warn_if_precise(
     self,
@@ -95,7 +95,7 @@ class Prior:
     """
     with torch.no_grad():
       prior_mean, prior_std = self._network(inputs)
-    weight = self._weight.expand(len(mean))
+    weight = (self._config.weight * self._faded).expand(len(mean))
     if self._config.normalise:
       weight = weight * torch.minimum(q[0], q[1]).abs().mean(-1)
     if self._config.distance == "divergence":

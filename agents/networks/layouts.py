@@ -14,7 +14,6 @@ from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
 from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
 
 SHARED_TRUNK, SEPARATE = "shared_trunk", "separate"
-LAYOUTS = (SHARED_TRUNK, SEPARATE)
 
 
 def make_intentions(
@@ -29,7 +28,7 @@ def make_intentions(
   """Draws K intentions.
 
   Args:
-    layout: a name in `LAYOUTS`.
+    layout: shared_trunk or separate.
     standardiser: raw observation -> input.
     tasks: K.
     hidden: H.

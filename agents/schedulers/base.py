@@ -1,19 +1,26 @@
 """What every scheduler does, and the returns that some learn from."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from lfgp_dmc.agents import serialisation
 
-class Scheduler(Protocol):
-  """Chooses a task every xi steps; all randomness from one generator."""
+
+class Scheduler:
+  """Chooses a task every xi steps; by default one that learns nothing."""
+
+  def __init__(self, generator: np.random.Generator):
+    """Keeps the source of all choices."""
+    self._generator = generator
 
   def begin_episode(self) -> None:
     """Forgets the choices of the last episode."""
 
   def next_task(self) -> int:
     """Chooses the index of the task of the next xi steps."""
+    raise NotImplementedError
 
   def end_episode(self, main_returns: Sequence[float]) -> None:
     """Learns from the main task's return G_h from each period h to the end.
@@ -22,14 +29,15 @@ class Scheduler(Protocol):
       ValueError: there is not one return for each choice.
     """
 
-  def probabilities(self) -> np.ndarray:
-    """float64 [K], the distribution of the next choice, for logs."""
-
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values, the generator's state among them."""
+    return {"generator": serialisation.numpy_generator_state(self._generator)}
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
+    serialisation.load_numpy_generator_state(
+      self._generator, state["generator"]
+    )
 
 
 def period_returns(

@@ -5,12 +5,11 @@ that ours lack (Unstack), its row and column are dropped and the rest of each
 row is renormalised.
 """
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.schedulers.base import Scheduler
 
 RESET = "reset"  # the row of an episode's first choice
 _SIXTH, _FIFTEENTH = 1 / 6, 1 / 15
@@ -106,18 +105,13 @@ def table_for(tasks: Sequence[str]) -> np.ndarray:
   return table / table.sum(1, keepdims=True)
 
 
-class ConditionalWeighted:
+class ConditionalWeighted(Scheduler):
   """Draws the next task from the row of the last one."""
 
   def __init__(self, table: np.ndarray, generator: np.random.Generator):
-    """Keeps the table.
-
-    Args:
-      table: [K + 1, K], as `table_for` gives it.
-      generator: source of the choices.
-    """
+    """Keeps the table [K + 1, K] of `table_for`."""
+    super().__init__(generator)
     self._table = table
-    self._generator = generator
     self._last = -1  # the reset row
 
   def begin_episode(self) -> None:
@@ -133,16 +127,3 @@ class ConditionalWeighted:
     row = self.probabilities()
     self._last = int(self._generator.choice(len(row), p=row))
     return self._last
-
-  def end_episode(self, main_returns: Sequence[float]) -> None:
-    """Learns nothing."""
-
-  def state_dict(self) -> dict[str, Any]:
-    """The generator's state."""
-    return {"generator": serialisation.numpy_generator_state(self._generator)}
-
-  def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned."""
-    serialisation.load_numpy_generator_state(
-      self._generator, state["generator"]
-    )

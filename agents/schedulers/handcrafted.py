@@ -1,11 +1,10 @@
 """Weighted random choices, mixed with handcrafted sequences of tasks."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.schedulers.base import Scheduler
 from lfgp_dmc.agents.schedulers.weighted_random import WeightedRandom
 
 MAIN = "main"  # stands for the main task, whichever it is
@@ -54,7 +53,7 @@ def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
   return [tuple(names[name] for name in sequence) for sequence in wanted]
 
 
-class WeightedRandomHandcrafted:
+class WeightedRandomHandcrafted(Scheduler):
   """At each episode's start: a handcrafted sequence, or weighted random."""
 
   def __init__(
@@ -72,10 +71,10 @@ class WeightedRandomHandcrafted:
       probability: of a sequence, 0..1; they are equally likely.
       generator: source of the choices.
     """
+    super().__init__(generator)
     self._random = WeightedRandom(weights, generator)
     self._sequences = [tuple(sequence) for sequence in sequences]
     self._probability = probability
-    self._generator = generator
     self._sequence: tuple[int, ...] = ()
     self._period = 0
 
@@ -87,14 +86,6 @@ class WeightedRandomHandcrafted:
       chosen = int(self._generator.integers(len(self._sequences)))
       self._sequence = self._sequences[chosen]
 
-  def probabilities(self) -> np.ndarray:
-    """float64 [K]; one-hot while a sequence runs."""
-    if not self._sequence:
-      return self._random.probabilities()
-    one_hot = np.zeros(len(self._random.probabilities()))
-    one_hot[self._sequence[self._period % len(self._sequence)]] = 1.0
-    return one_hot
-
   def next_task(self) -> int:
     """The sequence's next task, or a random one."""
     if not self._sequence:
@@ -102,16 +93,3 @@ class WeightedRandomHandcrafted:
     task = self._sequence[self._period % len(self._sequence)]
     self._period += 1
     return task
-
-  def end_episode(self, main_returns: Sequence[float]) -> None:
-    """Learns nothing."""
-
-  def state_dict(self) -> dict[str, Any]:
-    """The generator's state."""
-    return {"generator": serialisation.numpy_generator_state(self._generator)}
-
-  def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned."""
-    serialisation.load_numpy_generator_state(
-      self._generator, state["generator"]
-    )

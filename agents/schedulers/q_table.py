@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.schedulers.base import Scheduler
 
 
-class QTable:
+class QTable(Scheduler):
   """Boltzmann choice over Q(history, task), learned by moving averages.
 
   Equation 12 of the paper; its hyper-parameter table gives the defaults.
@@ -33,8 +33,8 @@ class QTable:
       decay: factor on the temperature at every choice.
       minimum: lowest temperature.
     """
+    super().__init__(generator)
     self._tasks = tasks
-    self._generator = generator
     self._phi = phi
     self._decay = decay
     self._minimum = minimum
@@ -92,15 +92,15 @@ class QTable:
     histories = np.full((len(self._table), longest), -1, np.int64)
     for row, history in enumerate(self._table):
       histories[row, : len(history)] = history
-    return {
+    return super().state_dict() | {
       "histories": histories,
       "values": np.array(list(self._table.values()), np.float64),
       "temperature": float(self.temperature),
-      "generator": serialisation.numpy_generator_state(self._generator),
     }
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
+    super().load_state_dict(state)
     self._table = {
       tuple(int(task) for task in history if task >= 0): float(value)
       for history, value in zip(
@@ -109,6 +109,3 @@ class QTable:
     }
     self.temperature = float(state["temperature"])
     self._history = ()
-    serialisation.load_numpy_generator_state(
-      self._generator, state["generator"]
-    )

@@ -1,31 +1,22 @@
 """Fixed weights, each choice independent of the others."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
-from lfgp_dmc.agents import serialisation
+from lfgp_dmc.agents.schedulers.base import Scheduler
 
 
-class WeightedRandom:
+class WeightedRandom(Scheduler):
   """Draws every choice from one distribution."""
 
   def __init__(
     self, weights: Sequence[float] | np.ndarray, generator: np.random.Generator
   ):
-    """Normalises the weights.
-
-    Args:
-      weights: [K], 0 or more, not all 0.
-      generator: source of the choices.
-    """
+    """Normalises the weights, [K], 0 or more, not all 0."""
+    super().__init__(generator)
     self._probabilities = np.asarray(weights, np.float64)
     self._probabilities = self._probabilities / self._probabilities.sum()
-    self._generator = generator
-
-  def begin_episode(self) -> None:
-    """Nothing to forget."""
 
   def probabilities(self) -> np.ndarray:
     """The distribution, float64 [K]."""
@@ -35,19 +26,6 @@ class WeightedRandom:
     """Chooses a task."""
     return int(
       self._generator.choice(len(self._probabilities), p=self._probabilities)
-    )
-
-  def end_episode(self, main_returns: Sequence[float]) -> None:
-    """Learns nothing."""
-
-  def state_dict(self) -> dict[str, Any]:
-    """The generator's state."""
-    return {"generator": serialisation.numpy_generator_state(self._generator)}
-
-  def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned."""
-    serialisation.load_numpy_generator_state(
-      self._generator, state["generator"]
     )
 
 

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import ml_collections
 import pydantic
 
+from lfgp_dmc.agents import fields
 from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.launch.configs.algorithms import ALGORITHMS
@@ -25,7 +26,6 @@ SOURCE_TASKS = {
 }
 _PATHS = ("demonstrations", "transfer_from", "init_from")
 _Config = TypeVar("_Config", bound=RunConfig | LfgpConfig | BcConfig)
-_SAYS = "Input should be "  # how pydantic starts what is valid
 
 
 def make_config(
@@ -59,21 +59,21 @@ def make_config(
     if not {*name.split(".")} & {*chosen.without}
   }
   values = _layered(of_preset, chosen.defaults, kinds or {})
-  fields = {field.name for field in dataclasses.fields(chosen.agent_config)}
+  known = {field.name for field in dataclasses.fields(chosen.agent_config)}
   chosen_kinds = {
     name.split(".")[1]: {"kind": value}
     for name, value in values.items()
     if name.endswith(KIND)
   }
-  groups = {k: v for k, v in chosen_kinds.items() if k in fields}
+  groups = {k: v for k, v in chosen_kinds.items() if k in known}
   agent, faults = _checked(chosen.agent_config, groups, "config.agent")
   if agent is None:
     raise ValueError("\n".join(faults))
   run = RunConfig(algorithm=algorithm, agent=agent)
   config = ml_collections.ConfigDict(dataclasses.asdict(run)).lock()
-  known = dict(flattened(config.to_dict()))
+  names = dict(flattened(config.to_dict()))
   config.update_from_flattened_dict(
-    {name: value for name, value in values.items() if name in known}
+    {name: value for name, value in values.items() if name in names}
   )
   return config
 
@@ -105,9 +105,9 @@ def from_dict(values: Mapping[str, Any]) -> RunConfig:
   if not isinstance(given, Mapping):
     raise ValueError(f"config.agent is {given!r}; valid: its fields")
   kinds = {
-    f"agent.{group}{KIND}": fields["kind"]
-    for group, fields in given.items()
-    if isinstance(fields, Mapping) and "kind" in fields
+    f"agent.{group}{KIND}": of_group["kind"]
+    for group, of_group in given.items()
+    if isinstance(of_group, Mapping) and "kind" in of_group
   }
   defaults = make_config(name, kinds=kinds).to_dict()
   known = dict(flattened(defaults))
@@ -202,22 +202,4 @@ def _checked(
   try:
     return kind(**values), []
   except pydantic.ValidationError as error:
-    return None, [_fault(fault, values, prefix) for fault in error.errors()]
-
-
-def _fault(fault: Any, values: Mapping[str, Any], prefix: str) -> str:
-  """Such as "config.agent.scheduler.xi is 0; valid: ..."."""
-  says = fault["msg"].removeprefix("Value error, ").removeprefix(_SAYS)
-  if not fault["loc"]:  # of fields together: they are named already
-    return "\n".join(f"{prefix}.{line}" for line in says.split("\n"))
-  name, within = prefix, values
-  for part in fault["loc"]:
-    if part in within:  # else the kind of a group
-      name, within = f"{name}.{part}", within[part]
-      within = within if isinstance(within, Mapping) else {}
-  if fault["type"] == "union_tag_invalid":
-    context = fault["ctx"]
-    return (
-      f"{name}.kind is {context['tag']!r}; valid: {context['expected_tags']}"
-    )
-  return f"{name} is {fault['input']!r}; valid: {says}"
+    return None, fields.faults(error, values, prefix)

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import torch
 
+from lfgp_dmc import toy
+from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents import bc, lfgp, synthetic
 from lfgp_dmc.agents.batches import Batch
 from lfgp_dmc.agents.bc import BcConfig
@@ -18,7 +20,8 @@ from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.lfgp.builder import make_learner as build_learner
 from lfgp_dmc.agents.lfgp.networks import make_networks
 from lfgp_dmc.agents.networks.trunk import Standardiser
-from lfgp_dmc.runs import pytree
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import loop, metrics, pytree
 
 TASKS = ("stack", "reach", "lift")
 OBS, A, B = 6, 2, 32
@@ -155,5 +158,44 @@ def reloaded(state: Mapping[str, Any]) -> dict[str, Any]:
 
 def assert_same_policy(one, other) -> None:
   """Both agents act alike, to the bit."""
-  for name, array in one.policy_arrays().items():
-    np.testing.assert_array_equal(array, other.policy_arrays()[name])
+  for name, array in one.policy.arrays().items():
+    np.testing.assert_array_equal(array, other.policy.arrays()[name])
+
+
+def make_toy_agent(
+  seed: int, rows: int, shown=None, reward_tasks: Sequence[str] = (), **fields
+):
+  """An agent for the toy world, and its empty replay."""
+  observations, actions = environments.widths(toy.PointEnvironment())
+  replay = Replay(rows, observations, actions, reward_tasks=reward_tasks)
+  agent = make_agent(
+    toy.TASKS,
+    seed,
+    shown=shown or {},
+    replay=replay,
+    observations=observations,
+    actions=actions,
+    **{"networks.hidden_size": 32, **fields},
+  )
+  return agent, replay
+
+
+def train_on_toy(agent, replay, env_steps: int, folder: str) -> None:
+  """Updates once a step, from 100 steps on."""
+  schedule = loop.TrainSchedule(
+    env_steps=env_steps, warmup_steps=100, progress_bar=False
+  )
+  log = metrics.MetricsLog(folder)
+  loop.train(toy.PointEnvironment(), agent, replay, schedule, log)
+
+
+def evaluate_on_toy(agent, episodes: int):
+  """The rows of an evaluation of both tasks."""
+  return evaluation.evaluate(
+    toy.PointEnvironment,
+    lambda: agent.policy,
+    toy.TASKS,
+    episodes=episodes,
+    seed=0,
+    progress=False,
+  )

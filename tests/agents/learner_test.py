@@ -29,10 +29,19 @@ class WhatMovesTest(parameterized.TestCase):
       fixtures.moved(before, learner.networks.critics), set(before)
     )
 
-  @parameterized.parameters("shared", "own")
-  def test_the_intention_loss_trains_heads_and_its_own_trunk(self, trunk):
+  @parameterized.product(
+    trunk=("shared", "own"), layout=("shared_trunk", "separate")
+  )
+  def test_the_intention_loss_trains_heads_and_its_own_trunk(
+    self, trunk, layout
+  ):
     learner = make_learner(
-      **STILL, **{"intention.learning_rate": 0.1, "networks.actor_trunk": trunk}
+      **STILL,
+      **{
+        "intention.learning_rate": 0.1,
+        "networks.actor_trunk": trunk,
+        "networks.layout": layout,
+      },
     )
     networks = learner.networks
     intentions = fixtures.states(networks.intentions)
@@ -42,7 +51,8 @@ class WhatMovesTest(parameterized.TestCase):
     moved = fixtures.moved(intentions, networks.intentions)
     heads = {name for name in intentions if name.startswith("heads")}
     self.assertEqual(moved & heads, heads)
-    self.assertEqual("trunk.first.weight" in moved, trunk == "own")
+    has_own = (trunk, layout) == ("own", "shared_trunk")
+    self.assertEqual("trunk.first.weight" in moved, has_own)
 
   @parameterized.parameters("shared", "own")
   def test_intention_loss_gives_no_gradient_to_critics(self, trunk):

@@ -41,24 +41,29 @@ def _step(agent, row):
   return action
 
 
-class LearningTest(absltest.TestCase):
+class LearningTest(parameterized.TestCase):
   def setUp(self):
     super().setUp()
     torch.set_num_threads(1)
 
-  def test_discriminator_learns_and_all_stays_finite(self):
-    agent = make_agent(TASKS, **_LEARNING)
-    for _ in range(5):
-      agent.update()
-    early = agent.metrics()
-    for _ in range(200):
-      agent.update()
-    agent.metrics()
-    for _ in range(20):
-      agent.update()
-    late = agent.metrics()
+  @parameterized.parameters(
+    (TASKS, {}),
+    (TASKS, {"reward.main_masked": "0:2", "reward.input": "state"}),
+    (
+      TASKS[:1],  # DAC
+      {"networks.layout": "separate", "scheduler.kind": "main_only"},
+    ),
+  )
+  def test_discriminator_learns_and_all_stays_finite(self, tasks, fields):
+    agent = make_agent(tasks, **_LEARNING, **fields)
+    means = []
+    for updates in (5, 200, 20):
+      for _ in range(updates):
+        agent.update()
+      means.append(agent.metrics())
+    early, _, late = means
     rise = 0.0
-    for task in TASKS:
+    for task in tasks:
       self.assertGreater(late[f"accuracy_expert/{task}"], 0.9)
       self.assertGreater(late[f"accuracy_policy/{task}"], 0.65)
       rise += late[f"logit_expert/{task}"] - early[f"logit_expert/{task}"]
@@ -66,7 +71,7 @@ class LearningTest(absltest.TestCase):
       self.assertGreater(
         late[f"logit_expert/{task}"], late[f"logit_policy/{task}"]
       )
-    self.assertGreater(rise / len(TASKS), 1.0)
+    self.assertGreater(rise / len(tasks), 1.0)
     self.assertLess(late["loss/discriminator"], early["loss/discriminator"])
     off = ("scheduler/", "loss/value", "value_", "distance")
     for name, value in late.items():
@@ -92,11 +97,17 @@ class ContractTest(parameterized.TestCase):
     agent.begin_episode()
     agent.act(np.zeros(OBS, np.float32))
     first = agent.metrics()
-    names = ["loss/discriminator", "loss/critic", "loss/policy"]
-    names += ["loss/temperature"]
-    for name in ("accuracy_expert", "accuracy_policy", "reward", "q"):
-      names += [f"{name}/{task}" for task in TASKS]
-    for name in ("temperature", "entropy", "scheduler"):
+    names = ["discriminator", "critic", "policy", "temperature"]
+    names = [f"loss/{name}" for name in names]
+    for name in [
+      "accuracy_expert",
+      "accuracy_policy",
+      "reward",
+      "q",
+      "temperature",
+      "entropy",
+      "scheduler",
+    ]:
       names += [f"{name}/{task}" for task in TASKS]
     self.assertContainsSubset(names, first)
     self.assertTrue(math.isnan(first["loss/critic"]))
@@ -139,7 +150,9 @@ class ContractTest(parameterized.TestCase):
       **{"inputs.standardise": True, "inputs.tanh_feature_scale": 0.1}
     )
     _live(agent)
-    stored = Policy.from_arrays(agent.policy_arrays(), agent.policy_options())
+    folder = self.create_tempdir().full_path
+    agent.save_policy(folder, {}, env_step=0)
+    stored = Policy.load(folder)
     rows = synthetic.transitions(3, OBS, A).observation
     np.testing.assert_array_equal(
       stored.act(rows, "lift"), agent.policy.act(rows, "lift")
@@ -215,6 +228,8 @@ class DeterminismTest(parameterized.TestCase):
     {"optimiser.weight_decay": 0.01, "inputs.standardise": True},
     {"pretraining.updates": 3, "reward.expert_share": 0.1},
     {"prior.weight": 1.0, "prior.decay": 0.9},
+    {"reward.main_masked": "0:2"},
+    {"networks.layout": "separate", "critic.value_penalty": 10.0},
   )
   def test_resumed_agent_goes_on_bit_for_bit(self, **fields):
     fields |= {**_PERIODS, "networks.actor_trunk": "own"}

@@ -7,6 +7,7 @@ import torch
 from absl.testing import absltest, parameterized
 from torch.nn import functional
 
+from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
 from lfgp_dmc.agents.networks.discriminator import Discriminator
 from lfgp_dmc.agents.networks.intentions import IntentionHeads, to_std
@@ -51,13 +52,8 @@ class InitialBoundsTest(absltest.TestCase):
     self.assertEqual(tuple(heads.output.weight.shape), (6, 256, 8))
     self.assertEqual(tuple(critics.output.weight.shape), (12, 256, 1))
 
-  def test_same_generator_seed_same_network(self):
-    first, second = (Trunk(OBS, H, _generator()) for _ in range(2))
-    for one, other in zip(first.parameters(), second.parameters(), strict=True):
-      torch.testing.assert_close(one, other, rtol=0, atol=0)
 
-
-class StackingTest(absltest.TestCase):
+class StackingTest(parameterized.TestCase):
   def test_stack_equals_separate_layers(self):
     layer = StackedLinear(K, OBS, H, _generator())
     rows = torch.randn(K, B, OBS, generator=_generator())
@@ -70,8 +66,9 @@ class StackingTest(absltest.TestCase):
     torch.testing.assert_close(layer(rows), expected)
     torch.testing.assert_close(layer.one(rows[1], 1), expected[1])
 
-  def test_one_intention_equals_its_row_of_all(self):
-    heads = IntentionHeads(K, H, H, A, _generator())
+  @parameterized.parameters(1, 2)
+  def test_one_intention_equals_its_row_of_all(self, layers):
+    heads = IntentionHeads(K, H, H, A, _generator(), layers)
     features = torch.randn(B, H, generator=_generator())
     mean, std = heads(features)
     self.assertEqual(tuple(mean.shape), (K, B, A))
@@ -97,26 +94,53 @@ class StackingTest(absltest.TestCase):
       alone = network(inputs, action[task])
       torch.testing.assert_close(together[:, task], alone[:, task])
 
-  def test_critic_head_equals_one_layer_over_features_and_action(self):
-    heads = TwinCriticHeads(K, H, H, A, _generator())
-    features = torch.randn(B, H, generator=_generator())
-    action = torch.randn(B, A, generator=_generator())
-    q = heads(features, action)
-    group = K + 1  # the second critic of task 1
-    weight = torch.cat(
-      [heads.feature_weight[group], heads.action_weight[group]]
-    )
-    hidden = torch.cat([features, action], -1) @ weight + heads.bias[group]
-    value = (
-      hidden.relu() @ heads.output.weight[group] + heads.output.bias[group]
-    )
-    torch.testing.assert_close(q[1, 1], value[:, 0])
-
   def test_layer_norm_bounds_the_values(self):
     heads = TwinCriticHeads(K, H, H, A, _generator(), layer_norm=True)
     q = heads(torch.full((B, H), 1e6), torch.zeros(B, A))
     bound = heads.output.weight.norm(dim=1).max() * math.sqrt(H) + 1
     self.assertLess(q.abs().max().item(), bound.item())
+
+
+class SeparateLayoutTest(absltest.TestCase):
+  def _shapes(self, module):
+    return {name: tuple(p.shape) for name, p in module.named_parameters()}
+
+  def test_has_the_papers_layers(self):
+    sizes = (1, 256, 4, _generator())
+    self.assertEqual(
+      self._shapes(
+        layouts.make_intentions("separate", Standardiser(59), *sizes)
+      ),  # 59-256-256-8
+      {
+        "heads.hidden.weight": (1, 59, 256),
+        "heads.hidden.bias": (1, 1, 256),
+        "heads.second.weight": (1, 256, 256),
+        "heads.second.bias": (1, 1, 256),
+        "heads.output.weight": (1, 256, 8),
+        "heads.output.bias": (1, 1, 8),
+      },
+    )
+    self.assertEqual(
+      self._shapes(layouts.make_critics("separate", 59, *sizes)),
+      {  # 63-256-256-1, twice
+        "heads.feature_weight": (2, 59, 256),
+        "heads.action_weight": (2, 4, 256),
+        "heads.bias": (2, 1, 256),
+        "heads.second.weight": (2, 256, 256),
+        "heads.second.bias": (2, 1, 256),
+        "heads.output.weight": (2, 256, 1),
+        "heads.output.bias": (2, 1, 1),
+      },
+    )
+
+  def test_one_task_alone_moves_nothing_of_another(self):
+    """No layer is shared: a gradient stays in its own group."""
+    heads = IntentionHeads(K, OBS, H, A, _generator(), 2)
+    mean, _ = heads(torch.randn(4, OBS, generator=_generator()))
+    mean[1].sum().backward()
+    for layer in (heads.hidden, heads.second, heads.output):
+      norms = layer.weight.grad.flatten(1).norm(dim=1)
+      self.assertEqual((norms > 0).tolist(), [False, True, False])
 
 
 class DiscriminatorTest(parameterized.TestCase):

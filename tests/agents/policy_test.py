@@ -6,26 +6,23 @@ import tempfile
 
 import numpy as np
 import torch
-from absl.testing import absltest
+from absl.testing import absltest, parameterized
 
-from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
-from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
 
 TASKS = ("main", "first")
 OBS, A, H = 5, 3, 8
 
 
-def _policy(seed=0):
-  generator = torch.Generator().manual_seed(seed)
+def _policy(layout="shared_trunk"):
+  generator = torch.Generator().manual_seed(0)
   standardiser = Standardiser(OBS)
-  rows = np.random.default_rng(seed).standard_normal((50, OBS))
+  rows = np.random.default_rng(0).standard_normal((50, OBS))
   standardiser.fit(rows.astype(np.float32))
-  network = IntentionNetwork(
-    standardiser,
-    Trunk(OBS, H, generator),
-    IntentionHeads(len(TASKS), H, H, A, generator),
-    owns_trunk=True,
+  network = layouts.make_intentions(
+    layout, standardiser, len(TASKS), H, A, generator
   )
   return Policy(network, TASKS)
 
@@ -94,14 +91,15 @@ class ActingTest(absltest.TestCase):
       policy.act(_observation(), "fly")
 
 
-class FolderTest(absltest.TestCase):
+class FolderTest(parameterized.TestCase):
   def setUp(self):
     super().setUp()
     parent = self.enter_context(tempfile.TemporaryDirectory())
     self.folder = pathlib.Path(parent) / "policy"
 
-  def test_round_trip_acts_the_same(self):
-    policy, rows = _policy(), _observation(3)
+  @parameterized.parameters("shared_trunk", "separate")
+  def test_round_trip_acts_the_same(self, layout):
+    policy, rows = _policy(layout), _observation(3)
     policy.save(self.folder, {"seed": 7})
     loaded = Policy.load(self.folder)
     self.assertEqual(loaded.tasks, TASKS)
@@ -152,9 +150,22 @@ class FolderTest(absltest.TestCase):
 
   def test_wrong_options_are_listed(self):
     policy = _policy()
-    options = policy.options() | {"action_size": "3", "tasks": []}
-    with self.assertRaisesRegex(ValueError, "action_size is '3'.*tasks is"):
+    options = policy.options() | {"action_size": "3", "tasks": [], "scale": 1}
+    with self.assertRaises(ValueError) as caught:
       Policy.from_arrays(policy.arrays(), options)
+    for fault in (
+      "policy.tasks is []; valid: ",
+      "policy.action_size is '3'; valid: a valid integer",
+      "unknown policy.scale",
+    ):
+      self.assertIn(fault, str(caught.exception))
+
+  def test_a_policy_stored_without_a_layout_has_a_trunk(self):
+    policy, row = _policy(), _observation()
+    options = policy.options()
+    del options["layout"]
+    loaded = Policy.from_arrays(policy.arrays(), options)
+    np.testing.assert_array_equal(loaded.act(row), policy.act(row))
 
 
 if __name__ == "__main__":

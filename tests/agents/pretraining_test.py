@@ -8,12 +8,10 @@ from absl import logging
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc import toy
-from lfgp_dmc.acting import collection, environments, evaluation
+from lfgp_dmc.acting import collection, evaluation
 from lfgp_dmc.acting.attempts import Plan
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp.prior import entropies
-from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.runs import loop, metrics
 from tests.agents import fixtures
 from tests.agents.fixtures import OBS, TASKS, A, make_agent, states
 
@@ -186,20 +184,14 @@ class KeptSuccessTest(absltest.TestCase):
     )
     shown = collection.collect(plan, "reset", toy.TASKS, 200, progress=False)
     shown = {task: part.demonstrations for task, part in shown.items()}
-    environment = toy.PointEnvironment()
-    observations, actions = environments.widths(environment)
-    replay = Replay(1200, observations, actions)
-    agent = make_agent(
-      toy.TASKS,
-      shown=shown,
-      replay=replay,
-      observations=observations,
-      actions=actions,
+    agent, replay = fixtures.make_toy_agent(
+      0,
+      1200,
+      shown,
       **{
         **_OWN,
         "intention.initial_temperature": 0.01,
         "intention.learning_rate": 3e-4,
-        "networks.hidden_size": 32,
         "pretraining.learning_rate": 3e-3,
         "pretraining.updates": 200,
         "prior.weight": 10.0,
@@ -209,25 +201,14 @@ class KeptSuccessTest(absltest.TestCase):
     agent.prepare()
     before, apart = self._success(agent), _distance(agent, shown)
     self.assertEqual(before, {"right": 1.0, "left": 1.0})
-    log = metrics.MetricsLog(self.create_tempdir().full_path)
-    schedule = loop.TrainSchedule(
-      env_steps=1100, warmup_steps=100, progress_bar=False
-    )
-    loop.train(environment, agent, replay, schedule, log)
+    folder = self.create_tempdir().full_path
+    fixtures.train_on_toy(agent, replay, 1100, folder)
     self.assertEqual(agent.updates, 1001)
     self.assertEqual(self._success(agent), before)
     self.assertLess(_distance(agent, shown), 1.2 * apart)
 
   def _success(self, agent):
-    rows = evaluation.evaluate(
-      toy.PointEnvironment,
-      lambda: agent.policy,
-      toy.TASKS,
-      episodes=10,
-      seed=0,
-      progress=False,
-    )
-    return evaluation.success_rates(rows)
+    return evaluation.success_rates(fixtures.evaluate_on_toy(agent, 10))
 
 
 def _distance(agent, shown):

@@ -52,18 +52,20 @@ class PeriodReturnsTest(absltest.TestCase):
 
 
 class QTableTest(absltest.TestCase):
+  def _play(self, table, returns):
+    table.begin_episode()
+    for _ in returns:
+      table.next_task()
+    table.end_episode(returns)
+    table.begin_episode()
+    return table
+
   def test_moving_average_over_all_prefixes(self):
     table = q_table.QTable(2, _Scripted([0, 1, 0, 0]), phi=0.6)
-    table.begin_episode()
-    table.next_task()
-    table.next_task()
-    table.end_episode([10.0, 20.0])
+    self._play(table, [10.0, 20.0])
     self.assertAlmostEqual(table.value([0]), 6.0)
     self.assertAlmostEqual(table.value([0, 1]), 12.0)
-    table.begin_episode()
-    table.next_task()
-    table.next_task()
-    table.end_episode([5.0, 1.0])
+    self._play(table, [5.0, 1.0])
     self.assertAlmostEqual(table.value([0]), 0.4 * 6 + 0.6 * 5)
     self.assertAlmostEqual(table.value([0, 0]), 0.6)
     self.assertAlmostEqual(table.value([0, 1]), 12.0)
@@ -73,20 +75,14 @@ class QTableTest(absltest.TestCase):
     table = q_table.QTable(
       3, _Scripted([1]), phi=1.0, temperature=2.0, decay=1.0
     )
-    table.begin_episode()
-    table.next_task()
-    table.end_episode([2 * math.log(4)])
-    table.begin_episode()
+    found = self._play(table, [2 * math.log(4)]).probabilities()
     # exp(Q / T) = 1, 4, 1.
-    np.testing.assert_allclose(table.probabilities(), [1 / 6, 4 / 6, 1 / 6])
+    np.testing.assert_allclose(found, [1 / 6, 4 / 6, 1 / 6])
 
   def test_huge_values_do_not_overflow(self):
     table = q_table.QTable(2, _Scripted([0]), phi=1.0, temperature=0.1)
-    table.begin_episode()
-    table.next_task()
-    table.end_episode([1e6])
-    table.begin_episode()
-    np.testing.assert_allclose(table.probabilities(), [1.0, 0.0])
+    found = self._play(table, [1e6]).probabilities()
+    np.testing.assert_allclose(found, [1.0, 0.0])
 
   def test_temperature_falls_at_every_choice_down_to_the_minimum(self):
     table = q_table.QTable(
@@ -105,18 +101,6 @@ class QTableTest(absltest.TestCase):
     table.next_task()
     with self.assertRaisesRegex(ValueError, "2 returns for 1 choices"):
       table.end_episode([1.0, 2.0])
-
-  def test_learns_the_better_of_two_tasks(self):
-    table = q_table.QTable(
-      2, np.random.default_rng(0), temperature=10, decay=0.97
-    )
-    chosen = []
-    for _ in range(300):
-      table.begin_episode()
-      task = table.next_task()
-      table.end_episode([float(task)])
-      chosen.append(task)
-    self.assertGreater(np.mean(chosen[-50:]), 0.95)
 
 
 class ConditionalTest(parameterized.TestCase):

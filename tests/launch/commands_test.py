@@ -163,7 +163,7 @@ class BlockRunTest(absltest.TestCase):
     for change, message in (
       ({"environment": "no.such:thing"}, "No module named 'no'"),
       ({"main_task": "juggle"}, "unknown task 'juggle'; valid tasks: stack"),
-      ({"policy": {}}, "valid: a list of task names"),
+      ({"policy": {}}, "policy.tasks is missing"),
     ):
       text = json.dumps({**stored, **change})
       (policy / "config.json").write_text(text)
