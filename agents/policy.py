@@ -19,11 +19,7 @@ from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data import files
-
-ARRAYS_FILE = "policy.safetensors"
-CONFIG_FILE = "config.json"
-# Under this key of `config.json` are the `PolicyOptions`.
-CONFIG_KEY = "policy"
+from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
 
 
 @fields.checked
@@ -84,7 +80,7 @@ class Policy:
     try:
       checked = PolicyOptions(**options)
     except pydantic.ValidationError as error:
-      faults = fields.faults(error, options, CONFIG_KEY)
+      faults = fields.faults(error, options, POLICY_FIELD)
       raise ValueError("; ".join(faults)) from None
     network = layouts.make_intentions(
       checked.layout,
@@ -105,19 +101,19 @@ class Policy:
       FileNotFoundError: a file is missing; the message names it.
       ValueError: a file is damaged; the message names it and the fault.
     """
-    config_path = Path(folder) / CONFIG_FILE
-    arrays_path = Path(folder) / ARRAYS_FILE
+    config_path = Path(folder) / CONFIG_NAME
+    arrays_path = Path(folder) / ARRAYS_NAME
     for path in (config_path, arrays_path):
       if not path.is_file():
         raise FileNotFoundError(f"no policy in {folder}: {path} is missing")
     try:
-      options = json.loads(config_path.read_text())[CONFIG_KEY]
+      options = json.loads(config_path.read_text())[POLICY_FIELD]
     except (OSError, ValueError, KeyError, TypeError) as error:
       raise ValueError(
-        f"{config_path}: no policy options under {CONFIG_KEY!r} ({error!r})"
+        f"{config_path}: no policy options under {POLICY_FIELD!r} ({error!r})"
       ) from error
     if not isinstance(options, dict):
-      raise ValueError(f"{config_path}: {CONFIG_KEY!r} is not an object")
+      raise ValueError(f"{config_path}: {POLICY_FIELD!r} is not an object")
     try:
       arrays = safetensors.numpy.load_file(arrays_path)
     except (OSError, safetensors.SafetensorError) as error:
@@ -142,11 +138,11 @@ class Policy:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    with files.replacing(folder / ARRAYS_FILE) as aside:
+    with files.replacing(folder / ARRAYS_NAME) as aside:
       safetensors.numpy.save_file(self.arrays(), aside)
     options = {**self.options(), "env_step": env_step}
     files.write_json(
-      folder / CONFIG_FILE, {**(config or {}), CONFIG_KEY: options}
+      folder / CONFIG_NAME, {**(config or {}), POLICY_FIELD: options}
     )
 
   def arrays(self) -> dict[str, np.ndarray]:

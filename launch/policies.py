@@ -18,7 +18,6 @@ from lfgp_dmc.runs import run_folder
 from lfgp_dmc.types import Actor
 
 SCRIPTED = "scripted"
-_ARRAYS = "policy.safetensors"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,8 +85,6 @@ def _of_folder(folder: str) -> PolicySpec:
   path = pathlib.Path(folder)
   try:
     config = run_folder.read_config(path)
-    if not (path / _ARRAYS).is_file():
-      raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
     policy: Any = stored_policy(folder)
     main_task = config.get("main_task", policy.tasks[0])
     world = EnvironmentSpec(

@@ -8,7 +8,6 @@ from lfgp_dmc.launch import assemble, command, datasets, initialise_run
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.runs.run import save_policy
 from lfgp_dmc.runs.schedule import Progress
 
 
@@ -62,7 +61,7 @@ def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
     config, parts, assemble.make_replay(config, parts)
   )
   parts.environment.close()
-  save_policy(folder, agent, config.to_dict(), env_step=0)
+  agent.save_policy(folder, config.to_dict(), env_step=0)
 
 
 def _with_newer_fields(stored: dict[str, Any]) -> dict[str, Any]:

@@ -15,6 +15,8 @@ from typing import Any, NamedTuple, Protocol, runtime_checkable
 import dm_env
 import numpy as np
 
+from lfgp_dmc.data import files
+
 Metrics = dict[str, float]
 
 
@@ -63,11 +65,16 @@ class Agent(Protocol):
   def metrics(self) -> Metrics:
     """Means since the last call; the names stay the same."""
 
-  def policy_arrays(self) -> dict[str, np.ndarray]:
-    """What acting needs, by name: the content of `policy.safetensors`."""
+  def save_policy(
+    self, folder: files.Path, config: Mapping[str, Any], env_step: int
+  ) -> None:
+    """Makes a folder the policy folder of the present policy.
 
-  def policy_options(self) -> dict[str, Any]:
-    """The JSON-able options that go with `policy_arrays`."""
+    Args:
+      folder: gets `policy.safetensors` and `config.json`.
+      config: what else `config.json` holds.
+      env_step: how long the agent was trained.
+    """
 
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values: everything a resume needs but the replay."""

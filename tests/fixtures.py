@@ -71,11 +71,8 @@ class ToyAgent:
   def metrics(self):
     return {"loss/critic": float(self.updates)}
 
-  def policy_arrays(self):
-    return {"weights": np.zeros(2, np.float32)}
-
-  def policy_options(self):
-    return {"tasks": list(self.tasks)}
+  def save_policy(self, folder, config, env_step):
+    pass
 
   def state_dict(self):
     return {}

@@ -18,6 +18,7 @@ from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
 
@@ -124,13 +125,11 @@ class BcAgent:
       row[f"loss_validation/{task}"] = loss
     return row
 
-  def policy_arrays(self) -> dict[str, np.ndarray]:
-    """What acting needs, of the best weights so far."""
-    return self.policy.arrays()
-
-  def policy_options(self) -> dict[str, Any]:
-    """The JSON-able options that go with `policy_arrays`."""
-    return self.policy.options()
+  def save_policy(
+    self, folder: files.Path, config: Mapping[str, Any], env_step: int
+  ) -> None:
+    """Makes a folder the policy folder of the best weights so far."""
+    self.policy.save(folder, config, env_step)
 
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values; taken between epochs."""

@@ -18,6 +18,7 @@ from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
+from lfgp_dmc.data import files
 from lfgp_dmc.types import Episode, Metrics
 
 
@@ -195,13 +196,11 @@ class LfgpAgent:
     self._choices[:] = 0
     return means
 
-  def policy_arrays(self) -> dict[str, np.ndarray]:
-    """What acting needs, by name; with `policy_options`, a `Policy`."""
-    return self.policy.arrays()
-
-  def policy_options(self) -> dict[str, Any]:
-    """The JSON-able options that go with `policy_arrays`."""
-    return self.policy.options()
+  def save_policy(
+    self, folder: files.Path, config: Mapping[str, Any], env_step: int
+  ) -> None:
+    """Makes a folder the policy folder of the present policy."""
+    self.policy.save(folder, config, env_step)
 
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values; taken between episodes."""

@@ -5,21 +5,19 @@ kill between the two leaves a replay that is ahead, and it is rewound.
 """
 
 import dataclasses
-import pathlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import dm_env
-import safetensors.numpy
 from absl import logging
 
-from lfgp_dmc.data import csv_files, evaluation_csv, files
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.runs import checkpoints, loop, run_folder, supervised
+from lfgp_dmc.runs import checkpoints, loop, supervised
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
-from lfgp_dmc.types import ActingAgent, Agent, SupervisedAgent
+from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 
 class Run:
@@ -145,21 +143,7 @@ class Run:
     )
 
   def _save_policy(self, env_step: int) -> None:
-    save_policy(self._folder.path, self.agent, self._config, env_step)
-
-
-def save_policy(
-  folder: files.Path, agent: Agent, config: Mapping[str, Any], env_step: int
-) -> None:
-  """Makes a folder the policy folder of the agent's present policy."""
-  folder = pathlib.Path(folder)
-  with files.replacing(folder / run_folder.ARRAYS_NAME) as aside:
-    safetensors.numpy.save_file(agent.policy_arrays(), aside)
-  options = {**agent.policy_options(), "env_step": env_step}
-  files.write_json(
-    folder / run_folder.CONFIG_NAME,
-    {**config, run_folder.POLICY_FIELD: options},
-  )
+    self.agent.save_policy(self._folder.path, self._config, env_step)
 
 
 def _rewind(replay: Replay, total: int) -> None:

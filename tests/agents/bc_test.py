@@ -129,7 +129,7 @@ class EarlyStopTest(absltest.TestCase):
     losses = [5.0, 4.0, 4.5, 3.0, 3.0, 3.1, 3.2, 1.0]
     agent, epoch = self._with_losses(losses, tolerance=3)
     self.assertEqual(epoch, 7)  # the third after the fourth
-    bias = agent.policy_arrays()["heads.output.bias"]
+    bias = agent.policy.arrays()["heads.output.bias"]
     np.testing.assert_array_equal(bias, np.full_like(bias, 4))
     self.assertEqual(agent.metrics()["loss/best_validation"], 3.0)
     self.assertEqual(agent.metrics()["best_epoch"], 4)

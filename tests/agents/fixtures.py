@@ -158,8 +158,8 @@ def reloaded(state: Mapping[str, Any]) -> dict[str, Any]:
 
 def assert_same_policy(one, other) -> None:
   """Both agents act alike, to the bit."""
-  for name, array in one.policy_arrays().items():
-    np.testing.assert_array_equal(array, other.policy_arrays()[name])
+  for name, array in one.policy.arrays().items():
+    np.testing.assert_array_equal(array, other.policy.arrays()[name])
 
 
 def make_toy_agent(

@@ -150,7 +150,9 @@ class ContractTest(parameterized.TestCase):
       **{"inputs.standardise": True, "inputs.tanh_feature_scale": 0.1}
     )
     _live(agent)
-    stored = Policy.from_arrays(agent.policy_arrays(), agent.policy_options())
+    folder = self.create_tempdir().full_path
+    agent.save_policy(folder, {}, env_step=0)
+    stored = Policy.load(folder)
     rows = synthetic.transitions(3, OBS, A).observation
     np.testing.assert_array_equal(
       stored.act(rows, "lift"), agent.policy.act(rows, "lift")

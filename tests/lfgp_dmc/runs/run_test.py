@@ -54,9 +54,6 @@ class _Agent(fixtures.ToyAgent):
     summed, self._summed = self._summed, 0.0
     return {"loss/critic": summed, "q/right": float(self._weights[0])}
 
-  def policy_arrays(self):
-    return {"weights": self._weights.copy()}
-
   def state_dict(self):
     return {
       "random": self.random.bit_generator.state,
