@@ -58,7 +58,7 @@ def build(
     cuda_graphs: on a GPU, updates are recorded, then replayed.
 
   Raises:
-    ValueError: demonstrations, stored rewards or scheduler do not fit the tasks.
+    ValueError: demonstrations, stored rewards or scheduler do not fit.
   """
   device = torch.device(device)
   dtype = torch.bfloat16 if bfloat16 else torch.float32

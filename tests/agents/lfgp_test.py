@@ -121,7 +121,7 @@ class ContractTest(parameterized.TestCase):
     chosen = []
     for _ in range(20):
       action = agent.act(np.zeros(OBS, np.float32))
-      chosen.append(agent.task)
+      chosen.append(agent._task)
       self.assertEqual(action.dtype, np.float32)
     for start in range(0, 20, 5):
       self.assertLen(set(chosen[start : start + 5]), 1)
@@ -138,7 +138,7 @@ class ContractTest(parameterized.TestCase):
     chosen = []
     for row in rows.observation:
       agent.act(row)
-      chosen.append(agent.tasks.index(agent.task))
+      chosen.append(agent.tasks.index(agent._task))
     agent.end_episode(Episode(rows.observation, rows.action))
     reward = agent.learner.reward.rewards(*map(torch.from_numpy, rows[:2]))[0]
     expected = sum(reward[10 + t].item() * 0.5**t for t in range(10))

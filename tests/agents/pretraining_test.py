@@ -39,7 +39,7 @@ class PretrainingTest(parameterized.TestCase):
     before = error()
     agent.prepare()
     self.assertLess(error(), 0.2 * before)
-    self.assertEqual(agent.updates, 0)
+    self.assertEqual(agent.learner.updates, 0)
 
   def test_intentions_and_temperatures_wait_for_the_critics(self):
     agent = make_agent(
@@ -204,7 +204,7 @@ class KeptSuccessTest(absltest.TestCase):
     self.assertEqual(before, {"right": 1.0, "left": 1.0})
     folder = self.create_tempdir().full_path
     fixtures.train_on_toy(agent, replay, 1100, folder)
-    self.assertEqual(agent.updates, 1001)
+    self.assertEqual(agent.learner.updates, 1001)
     self.assertEqual(self._success(agent), before)
     self.assertLess(_distance(agent, shown), 1.2 * apart)
 
