@@ -19,7 +19,7 @@ from lfgp_dmc.agents.optimisation import clipped_step, make_optimiser
 def cloning_loss(
   name: str, mean: torch.Tensor, std: torch.Tensor, action: torch.Tensor
 ) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-  """By name: the expert's action as the mean, or as a sample's likelihood."""
+  """By name: squared error of the mean action, or likelihood."""
   if name == "likelihood":
     return likelihood_loss(mean, std, action)
   return behaviour_cloning_loss(mean, action)
@@ -56,7 +56,7 @@ class IntentionCloner:
     self._schedule: torch.optim.lr_scheduler.LRScheduler | None = None
 
   def anneal(self, updates: int) -> None:
-    """Lets the step size fall to 0 in so many updates, as a half cosine."""
+    """Anneals the step size to 0 over the updates, by a half cosine."""
     self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
       self._optimiser, updates
     )

@@ -62,7 +62,7 @@ def _pooled(
 
 
 class ExpertPool:
-  """Rows of all tasks one after the other, with offsets."""
+  """The rows of all tasks, concatenated."""
 
   def __init__(
     self,
@@ -162,7 +162,7 @@ class ExpertPool:
   def sample_transitions(
     self, generator: np.random.Generator, rows: int
   ) -> Batch:
-    """Draws transitions, split evenly over tasks; the main has the rest.
+    """Draws transitions, in equal shares; the rest are the main task's.
 
     Args:
       generator: source of the indices.

@@ -1,4 +1,4 @@
-"""Means of metrics over updates, read from the device only when asked."""
+"""Means of metrics over updates, read from the device only on demand."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -17,7 +17,7 @@ from lfgp_dmc.launch import configs
 def define(
   arguments: Sequence[str], flag_values: flags.FlagValues = flags.FLAGS
 ) -> None:
-  """Defines `--preset`, and `--config.*` for the algorithm and preset asked.
+  """Defines `--preset`, and `--config.*` for the algorithm, preset and kinds.
 
   Args:
     arguments: of the command, with flagfiles expanded.

@@ -11,7 +11,7 @@ from lfgp_dmc.data.demonstrations import Demonstrations
 
 
 class SplitPairs:
-  """Each task's pairs in a training and a validation part, on the device.
+  """Each task's pairs on the device, split for training and validation.
 
   The split is by rows, not by episodes, as in the paper ("dividing each expert
   buffer into a 70%/30% split"): a validation row has neighbours in time among

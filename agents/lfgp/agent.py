@@ -68,16 +68,6 @@ class LfgpAgent:
     self._first_updates = 0  # before the first step, after a transfer
     self._has_started = False
 
-  @property
-  def updates(self) -> int:
-    """Updates made so far, warm start not counted."""
-    return self.learner.updates
-
-  @property
-  def task(self) -> str:
-    """The task whose intention acts now."""
-    return self._task
-
   def start_from(self, policy: Policy) -> None:
     """Lets the intentions start as those of a policy, by task name.
 
@@ -199,7 +189,7 @@ class LfgpAgent:
   def save_policy(
     self, folder: files.Path, config: Mapping[str, Any], env_step: int
   ) -> None:
-    """Makes a folder the policy folder of the present policy."""
+    """Writes the current policy; see `Policy.save`."""
     self.policy.save(folder, config, env_step)
 
   def state_dict(self) -> dict[str, Any]:

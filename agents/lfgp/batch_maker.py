@@ -60,7 +60,7 @@ class BatchMaker:
       self._pool.check_finals()
 
   def draw(self, updates: int) -> Draw:
-    """Draws for one update, after so many of them."""
+    """Draws for the update after the first `updates`."""
     match self._config:
       case DiscriminatorReward() as config:
         return self._with_experts(config, updates)
@@ -82,8 +82,7 @@ class BatchMaker:
     rows = int(share * self._rows)
     batch = self._transitions(self._rows - rows)
     if rows:
-      shown = self._pool.sample_transitions(self.generator, rows)
-      batch = joined(batch, shown)
+      batch = joined(batch, self._pool.sample_transitions(self.generator, rows))
     return Draw(batch, policy, expert)
 
   def _transitions(self, rows: int) -> Batch:

@@ -1,5 +1,6 @@
 """Builds the agent: its config is taken apart here, a group for each part."""
 
+import functools
 from collections.abc import Mapping, Sequence
 
 import torch
@@ -14,7 +15,7 @@ from lfgp_dmc.agents.lfgp.config import (
   LfgpConfig,
 )
 from lfgp_dmc.agents.lfgp.critic_learner import CriticLearner
-from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder, Recorder
+from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder
 from lfgp_dmc.agents.lfgp.discriminator_reward import DiscriminatorRewards
 from lfgp_dmc.agents.lfgp.example_reward import ExampleRewards
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
@@ -23,7 +24,7 @@ from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, make_networks
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
-from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards, reward_columns
+from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards
 from lfgp_dmc.agents.schedulers import make_scheduler
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
@@ -42,7 +43,7 @@ def build(
   bfloat16: bool = False,
   cuda_graphs: bool = True,
 ) -> LfgpAgent:
-  """Builds an LfGP agent.
+  """Builds an LfGP agent; same seed and calls, same numbers.
 
   Args:
     config: settings.
@@ -56,15 +57,12 @@ def build(
     bfloat16: products in bfloat16; parameters stay float32.
     cuda_graphs: on a GPU, updates are recorded, then replayed.
 
-  Returns:
-    The agent; same seed and calls, same numbers.
-
   Raises:
-    ValueError: demonstrations are missing or of other sizes, the replay lacks
-      rewards that are needed, or the scheduler does not fit the tasks.
+    ValueError: demonstrations, stored rewards or scheduler do not fit.
   """
   device = torch.device(device)
   dtype = torch.bfloat16 if bfloat16 else torch.float32
+  random = functools.partial(seeding.generator, seed)
   used = demonstrations if config.uses_demonstrations else None
   standardiser = make_standardiser(
     config.inputs, used, tasks, observation_size, action_size
@@ -75,11 +73,8 @@ def build(
     config, len(tasks), action_size, standardiser, initial, device
   )
   noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
-  recorder = None
-  if device.type == "cuda" and cuda_graphs:
-    recorder = CudaRecorder(noise)
-  columns = reward_columns(replay, tasks) if config.keeps_rewards else []
-  learner = make_learner(config, networks, noise, dtype, recorder, columns)
+  columns = replay.reward_columns(tasks) if config.keeps_rewards else []
+  learner = make_learner(config, networks, noise, dtype, columns, cuda_graphs)
   batches = BatchMaker(
     config.reward,
     config.batch_size,
@@ -87,15 +82,13 @@ def build(
     columns,
     experts,
     standardiser,
-    seeding.generator(seed, "sampling"),
+    random("sampling"),
   )
   return LfgpAgent(
     tasks,
     learner,
     batches,
-    make_scheduler(
-      config.scheduler, tasks, seeding.generator(seed, "scheduler")
-    ),
+    make_scheduler(config.scheduler, tasks, random("scheduler")),
     Pretraining(config.pretraining, config.optimiser, config.batch_size, dtype),
     experts,
     seed,
@@ -109,8 +102,8 @@ def make_learner(
   networks: LfgpNetworks,
   generator: torch.Generator,
   dtype: torch.dtype = torch.float32,
-  recorder: Recorder | None = None,
   stored_columns: Sequence[int] = (),
+  cuda_graphs: bool = False,
 ) -> LfgpLearner:
   """Builds what trains the networks.
 
@@ -119,9 +112,10 @@ def make_learner(
     networks: what to train.
     generator: on the networks' device, source of all noise.
     dtype: of products.
-    recorder: see `LfgpLearner`.
     stored_columns: the tasks' places among stored rewards, if those are used.
+    cuda_graphs: on a GPU, updates are recorded, then replayed.
   """
+  is_recorded = cuda_graphs and generator.device.type == "cuda"
   prior = None
   if networks.prior is not None:
     prior = Prior(config.prior, networks.prior, generator.device)
@@ -140,7 +134,7 @@ def make_learner(
     prior,
     generator,
     config.critic.warmup_updates,
-    recorder,
+    CudaRecorder(generator) if is_recorded else None,
   )
 
 

@@ -114,7 +114,7 @@ class PretrainingConfig:
 
 @checked
 class PriorConfig:
-  """Staying near the first intentions, on the replay's rows."""
+  """Regularises intentions towards the first ones, on replayed rows."""
 
   weight: NonNegative = 0.0
   distance: Literal["squared_error", "divergence"] = "squared_error"
@@ -141,7 +141,7 @@ class LfgpConfig:
 
   @model_validator(mode="after")
   def _check_groups(self):
-    """Raises ValueError: groups do not go together."""
+    """Raises ValueError that lists what does not go together."""
     faults = [*self._reward_faults()]
     if self.pretraining.updates and self.shares_trunk:
       faults.append(
@@ -181,7 +181,7 @@ class LfgpConfig:
 
   @property
   def uses_demonstrations(self) -> bool:
-    """Whether there is anything to do with demonstrations."""
+    """Whether demonstrations are needed."""
     return (
       not self.keeps_rewards
       or self.pretraining.updates > 0
@@ -190,5 +190,5 @@ class LfgpConfig:
 
   @property
   def keeps_rewards(self) -> bool:
-    """Whether the replay has to keep dense rewards."""
+    """Whether the replay must store dense rewards."""
     return isinstance(self.reward, StoredReward)

@@ -87,7 +87,7 @@ class CriticLearner:
 
   @torch.no_grad()
   def _target(self, batch: LabelledBatch) -> torch.Tensor:
-    """What values should be, [K, B]."""
+    """The soft Bellman targets, [K, B]."""
     networks = self._networks
     next_inputs = batch.next_inputs.to(self._dtype)
     mean, std = networks.intentions(next_inputs)

@@ -21,7 +21,7 @@ Metrics = dict[str, torch.Tensor]
 
 
 class DiscriminatorRewards(RewardSource):
-  """The discriminators of all tasks: one network, or the main task's apart."""
+  """The discriminators of all tasks; the main task may have its own network."""
 
   def __init__(
     self,

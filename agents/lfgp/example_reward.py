@@ -19,10 +19,9 @@ from lfgp_dmc.types import Episode
 
 
 class ExampleBounds(ValueBounds):
-  """Bounds that follow from the rewards -scale and +scale.
+  """Bounds from rewards of -scale and +scale.
 
-  But for rows of the replay: their greatest value is what the examples have
-  now.
+  The greatest value of the replay's rows is the examples' current value.
   """
 
   def __call__(
@@ -50,7 +49,7 @@ class ExampleRewards(RewardSource):
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Keeps what is needed.
+    """Keeps settings and networks.
 
     Args:
       config: shares and scale.
@@ -82,7 +81,7 @@ class ExampleRewards(RewardSource):
     )
 
   def main_rewards(self, episode: Episode) -> np.ndarray:
-    """Nothing that is done earns more than -scale."""
+    """-scale at each step: what is played is no example."""
     return np.full(len(episode.action), -self._scale)
 
   @torch.no_grad()

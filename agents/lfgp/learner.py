@@ -1,4 +1,4 @@
-"""One update of all networks, Algorithm 1 of the paper; torch alone."""
+"""One update of all networks, Algorithm 1 of the paper."""
 
 import functools
 from collections.abc import Mapping

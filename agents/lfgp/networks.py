@@ -20,16 +20,16 @@ _Network = TypeVar("_Network", bound=nn.Module)
 
 @dataclasses.dataclass
 class LfgpNetworks:
-  """What the learner trains; with a shared trunk, intentions' = critics'."""
+  """All networks; a shared trunk is one module in intentions and critics."""
 
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  # Of all tasks, or of all but the main task; None: no reward comes from it.
+  # Of all tasks, or of all but the main; None: no reward comes from it.
   discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
   prior: IntentionNetwork | None = None  # the first intentions, frozen
-  main_discriminator: Discriminator | None = None  # the main task's, if apart
+  main_discriminator: Discriminator | None = None  # the main task's own
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
@@ -112,7 +112,7 @@ def _make_discriminators(
 
   if not config.main_masked:
     return None, make(tasks, config.masked)
-  if tasks == 1:  # there are no others to be apart from
+  if tasks == 1:  # there are no others
     return None, make(1, config.main_masked)
   return make(1, config.main_masked), make(tasks - 1, config.masked)
 

@@ -40,7 +40,7 @@ class Prior:
     self._network.load_state_dict(intentions.state_dict())
 
   def fade(self, updates: int) -> None:
-    """Sets the weight after so many updates."""
+    """Decays the weight to its value after `updates`."""
     self._faded.fill_(self._config.decay**updates)
 
   def warn_if_precise(

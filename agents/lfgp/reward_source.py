@@ -13,7 +13,7 @@ Metrics = dict[str, torch.Tensor]
 
 
 class LabelledBatch(NamedTuple):
-  """What critics and intentions learn from."""
+  """A batch with its rewards, for critics and intentions."""
 
   inputs: torch.Tensor  # [B, O], standardised
   action: torch.Tensor  # [B, A]
@@ -25,7 +25,7 @@ class LabelledBatch(NamedTuple):
 
 
 class RewardSource:
-  """By default one that learns nothing; each source is a file of its own."""
+  """Base of the three sources; by default, nothing is learned."""
 
   # The kind of bounds on values that follows from its rewards.
   bounds: type[ValueBounds] = ValueBounds
@@ -35,7 +35,7 @@ class RewardSource:
     self.optimisers: dict[str, torch.optim.Optimizer] = {}
 
   def update(self, draw: Draw) -> Metrics:
-    """Makes an update of what gives the reward; its metrics."""
+    """Trains the source, where there is something to train; its metrics."""
     del draw
     return {}
 

@@ -1,4 +1,4 @@
-"""The losses of behaviour cloning, and of staying near what was cloned."""
+"""Losses of behaviour cloning, and of the distance from a prior."""
 
 import torch
 

@@ -41,8 +41,8 @@ class Discriminator(nn.Module):
       actions: A.
       hidden: H, units of each hidden layer.
       generator: source of the initial numbers.
-      inputs: "state_action" (paper) or "state": the action is not shown.
-      masked: which of the O floats are not shown either.
+      inputs: "state_action" (paper) or "state", without the action.
+      masked: which of the O floats are left out.
     """
     super().__init__()
     self.sees_action = inputs == "state_action"

@@ -23,7 +23,7 @@ class Standardiser(nn.Module):
   deviation: torch.Tensor  # the std, by its name in stored policies
 
   def __init__(self, size: int, tanh_feature_scale: float = 0.0):
-    """Starts as the identity, tanh features apart.
+    """Starts as the identity, before any tanh features.
 
     Args:
       size: O, floats of an observation.

@@ -55,7 +55,7 @@ class ConditionalConfig(_Periods):
 
 @checked
 class MainOnlyConfig(_Periods):
-  """LfGP-NS, and single-task methods."""
+  """The main task alone: LfGP-NS, and single-task methods."""
 
   kind: Literal["main_only"] = "main_only"
 

@@ -41,8 +41,8 @@ def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
   names = {name: index for index, name in enumerate(tasks)}
   main = tasks[0]
   has_bring = "bring" in names and main != "bring"
-  wanted = SEQUENCES + (INSERT_SEQUENCES if has_bring else ())
-  needed = {name for sequence in wanted for name in sequence} - {MAIN}
+  chosen = SEQUENCES + (INSERT_SEQUENCES if has_bring else ())
+  needed = {name for sequence in chosen for name in sequence} - {MAIN}
   missing = sorted(needed - names.keys())
   if missing:
     raise ValueError(
@@ -50,7 +50,7 @@ def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
       f"got {', '.join(tasks)}"
     )
   names[MAIN] = 0
-  return [tuple(names[name] for name in sequence) for sequence in wanted]
+  return [tuple(names[name] for name in sequence) for sequence in chosen]
 
 
 class WeightedRandomHandcrafted(Scheduler):

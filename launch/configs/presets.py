@@ -28,8 +28,8 @@ _RAL: dict[str, Any] = {
 # Ours: the fewest hours on two cores to the same success, from runs and trials
 # in results/learning/. Control at 5 Hz (the authors' later rate) makes nine
 # thousand pairs four times as much time; the intentions start from cloning and
-# stay near it; discriminators tell where a task ends, and from positions alone,
-# since velocities and history tell whose success it is.
+# stay near it; discriminators recognise a task's end, from positions alone, since
+# velocities and history give away whose success it is.
 _FAST: dict[str, Any] = {
   "bfloat16": True,
   "control_hz": 5,
@@ -64,8 +64,7 @@ _FAST: dict[str, Any] = {
 
 # Where millimetres decide (Bring, Insert): cloning by likelihood, a divergence
 # as the prior (which has an entropy term of its own: the temperature is to
-# vanish), and a discriminator for the main task alone that sees blue and the
-# fingers.
+# vanish), and a discriminator of the main task's own, on blue and the fingers.
 _FAST_PRECISE: dict[str, Any] = {
   **_FAST,
   "env_steps": 40_000,

@@ -53,20 +53,20 @@ def make_config(
     if name not in valid:
       raise ValueError(f"unknown {what} {name!r}; valid: {', '.join(valid)}")
   chosen = ALGORITHMS[algorithm]
-  of_preset = {
+  of_preset = {**PRESETS[preset], **OF_TASK.get((preset, main_task), {})}
+  applying = {
     name: value
-    for name, value in _of_preset(preset, main_task).items()
+    for name, value in of_preset.items()
     if not {*name.split(".")} & {*chosen.without}
   }
-  values = _layered(of_preset, chosen.defaults, kinds or {})
-  known = {field.name for field in dataclasses.fields(chosen.agent_config)}
-  chosen_kinds = {
-    name.split(".")[1]: {"kind": value}
-    for name, value in values.items()
-    if name.endswith(KIND)
+  values = _layered(applying, chosen.defaults, kinds or {})
+  groups = {field.name for field in dataclasses.fields(chosen.agent_config)}
+  of_kinds = {
+    group: {"kind": values[name]}
+    for group in groups
+    if (name := f"agent.{group}{KIND}") in values
   }
-  groups = {k: v for k, v in chosen_kinds.items() if k in known}
-  agent, faults = _checked(chosen.agent_config, groups, "config.agent")
+  agent, faults = _checked(chosen.agent_config, of_kinds, "config.agent")
   if agent is None:
     raise ValueError("\n".join(faults))
   run = RunConfig(algorithm=algorithm, agent=agent)
@@ -123,10 +123,9 @@ def from_dict(values: Mapping[str, Any]) -> RunConfig:
     ALGORITHMS[name].agent_config, merged["agent"], "config.agent"
   )
   merged |= {path: fill(merged[path], merged) for path in _PATHS}
-  if agent is not None:
-    merged["agent"] = agent
-  else:
-    del merged["agent"]
+  merged["agent"] = agent
+  if agent is None:  # still, all faults of the run are listed
+    merged |= {"agent": LfgpConfig(), "init_from": ""}
   run, more = _checked(RunConfig, merged, "config")
   if run is None or faults:
     raise ValueError("\n".join([*more, *faults]))
@@ -164,10 +163,6 @@ def hint(name: str, known: Iterable[str], prefix: str = "config.") -> str:
   if not close:
     return "see --help"
   return f"did you mean {' or '.join(prefix + other for other in close)}?"
-
-
-def _of_preset(preset: str, main_task: str) -> dict[str, Any]:
-  return {**PRESETS[preset], **OF_TASK.get((preset, main_task), {})}
 
 
 def _layered(*layers: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from lfgp_dmc.agents.lfgp.networks import make_networks
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics, pytree
+from lfgp_dmc.runs.schedule import TrainSchedule
 
 TASKS = ("stack", "reach", "lift")
 OBS, A, B = 6, 2, 32
@@ -92,7 +93,6 @@ def make_learner(
   observations: int = OBS,
   actions: int = A,
   dtype: torch.dtype = torch.float32,
-  recorder=None,
   **fields: Any,
 ):
   """Networks and their learner without data; `fields`: of `config`."""
@@ -106,7 +106,7 @@ def make_learner(
     torch.device("cpu"),
   )
   noise = torch.Generator().manual_seed(2)
-  return build_learner(settings, networks, noise, dtype, recorder)
+  return build_learner(settings, networks, noise, dtype)
 
 
 def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
@@ -182,7 +182,7 @@ def make_toy_agent(
 
 def train_on_toy(agent, replay, env_steps: int, folder: str) -> None:
   """Updates once a step, from 100 steps on."""
-  schedule = loop.TrainSchedule(
+  schedule = TrainSchedule(
     env_steps=env_steps, warmup_steps=100, progress_bar=False
   )
   log = metrics.MetricsLog(folder)

@@ -146,15 +146,6 @@ class ExpertPoolTest(absltest.TestCase):
       self.assertLessEqual(rows, own)
       self.assertGreater(len(rows), 40)
 
-  def test_final_rows_are_rows_of_success(self):
-    shown = fixtures.demonstrations()
-    drawn = fixtures.pool().sample(np.random.default_rng(0), 10, final_rows=4)
-    for index, task in enumerate(TASKS):
-      part = shown[task]
-      finals = {row.tobytes() for row in part.observation[part.is_last]}
-      found = [row.tobytes() in finals for row in drawn.inputs[index].numpy()]
-      self.assertEqual(found, [False] * 6 + [True] * 4)
-
   def test_transitions_are_split_with_the_rest_to_the_main_task(self):
     shown = fixtures.demonstrations()
     drawn = fixtures.pool().sample_transitions(np.random.default_rng(0), 11)

@@ -121,7 +121,7 @@ class ContractTest(parameterized.TestCase):
     chosen = []
     for _ in range(20):
       action = agent.act(np.zeros(OBS, np.float32))
-      chosen.append(agent.task)
+      chosen.append(agent._task)
       self.assertEqual(action.dtype, np.float32)
     for start in range(0, 20, 5):
       self.assertLen(set(chosen[start : start + 5]), 1)
@@ -138,7 +138,7 @@ class ContractTest(parameterized.TestCase):
     chosen = []
     for row in rows.observation:
       agent.act(row)
-      chosen.append(agent.tasks.index(agent.task))
+      chosen.append(agent.tasks.index(agent._task))
     agent.end_episode(Episode(rows.observation, rows.action))
     reward = agent.learner.reward.rewards(*map(torch.from_numpy, rows[:2]))[0]
     expected = sum(reward[10 + t].item() * 0.5**t for t in range(10))
@@ -158,11 +158,6 @@ class ContractTest(parameterized.TestCase):
       stored.act(rows, "lift"), agent.policy.act(rows, "lift")
     )
 
-  def test_single_task_runs(self):
-    agent = make_agent(("reach",), **{"scheduler.kind": "main_only"})
-    _live(agent)
-    self.assertEqual(agent.metrics()["scheduler/reach"], 1.0)
-
   def test_wrong_sizes_are_refused(self):
     shown = fixtures.demonstrations(observations=OBS + 1)
     with self.assertRaisesRegex(ValueError, "demonstrations of stack.*floats"):
@@ -176,13 +171,13 @@ class BatchTest(absltest.TestCase):
     self.assertEqual([batch is not None for batch in due],
                      [True, False, False] * 2 + [True])  # fmt: skip
 
-  def test_rows_of_success_come_in_their_share(self):
+  def test_rows_of_success_come_last_and_in_their_share(self):
     agent = make_agent(**{"reward.final_share": 0.5})
     expert = agent.batches.draw(0).expert
     for index, part in enumerate(fixtures.demonstrations().values()):
       finals = {row.tobytes() for row in part.observation[part.is_last]}
       found = [row.tobytes() in finals for row in expert.inputs[index].numpy()]
-      self.assertEqual(sum(found), 16)
+      self.assertEqual(found, [False] * 16 + [True] * 16)
 
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
     agent = make_agent(

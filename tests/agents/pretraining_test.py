@@ -8,10 +8,11 @@ from absl import logging
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc import toy
-from lfgp_dmc.acting import collection, evaluation
-from lfgp_dmc.acting.attempts import Plan
+from lfgp_dmc.acting import collection
+from lfgp_dmc.acting.attempts import CollectionPlan
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp.prior import entropies
+from lfgp_dmc.data import evaluation_csv
 from tests.agents import fixtures
 from tests.agents.fixtures import OBS, TASKS, A, make_agent, states
 
@@ -38,7 +39,7 @@ class PretrainingTest(parameterized.TestCase):
     before = error()
     agent.prepare()
     self.assertLess(error(), 0.2 * before)
-    self.assertEqual(agent.updates, 0)
+    self.assertEqual(agent.learner.updates, 0)
 
   def test_intentions_and_temperatures_wait_for_the_critics(self):
     agent = make_agent(
@@ -175,7 +176,7 @@ class KeptSuccessTest(absltest.TestCase):
 
   def test_success_of_cloning_is_kept(self):
     torch.set_num_threads(1)
-    plan = Plan(
+    plan = CollectionPlan(
       lambda task: toy.PointEnvironment(),
       toy.WalkingActor,
       "right",
@@ -203,12 +204,12 @@ class KeptSuccessTest(absltest.TestCase):
     self.assertEqual(before, {"right": 1.0, "left": 1.0})
     folder = self.create_tempdir().full_path
     fixtures.train_on_toy(agent, replay, 1100, folder)
-    self.assertEqual(agent.updates, 1001)
+    self.assertEqual(agent.learner.updates, 1001)
     self.assertEqual(self._success(agent), before)
     self.assertLess(_distance(agent, shown), 1.2 * apart)
 
   def _success(self, agent):
-    return evaluation.success_rates(fixtures.evaluate_on_toy(agent, 10))
+    return evaluation_csv.success_rates(fixtures.evaluate_on_toy(agent, 10))
 
 
 def _distance(agent, shown):

@@ -69,7 +69,7 @@ class StoredRewardsTest(absltest.TestCase):
     chosen = []
     for row in rows.observation:
       agent.act(row)
-      chosen.append(TASKS.index(agent.task))
+      chosen.append(TASKS.index(agent._task))
     agent.end_episode(Episode(rows.observation, rows.action, stored))
     expected = sum((15 + t) * 0.5**t for t in range(5))
     value = agent._scheduler.value(chosen[::5])

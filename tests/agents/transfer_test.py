@@ -84,7 +84,7 @@ class CarryOverTest(parameterized.TestCase):
     agent.carry_over(_networks(_trained()), OLD, 3)
     agent.prepare()
     agent.prepare()
-    self.assertEqual(agent.updates, updates)
+    self.assertEqual(agent.learner.updates, updates)
 
   def test_standardisation_comes_along_for_the_demonstrations_too(self):
     source = _trained(**{"inputs.standardise": True})
