@@ -72,20 +72,14 @@ def method_of(config: Mapping[str, Any]) -> str:
   """The method that a run's config describes.
 
   Returns:
-    The algorithm; after it `_transfer` if a field about transfer names a run,
-    else `_play` if the demonstrations' folder is named so, as `stack_play`.
+    The algorithm; after it `_transfer` if the run starts from another one, else
+    `_play` if the demonstrations' folder is named so, as `stack_play`.
   """
   algorithm = str(config.get("algorithm", "?"))
-  agent = config.get("agent")
-  fields = {**config, **(agent if isinstance(agent, Mapping) else {})}
-  # Strings alone: numbers such as transfer_updates are set without a transfer.
-  if any("transfer" in k and v and isinstance(v, str)
-         for k, v in fields.items()):  # fmt: skip
-    return f"{algorithm}_transfer"
   folder = pathlib.Path(config.get("demonstrations") or "")
-  if "play" in folder.name.split("_"):
-    return f"{algorithm}_play"
-  return algorithm
+  if config.get("transfer_from"):
+    return f"{algorithm}_transfer"
+  return f"{algorithm}_play" if "play" in folder.name.split("_") else algorithm
 
 
 def curve(
