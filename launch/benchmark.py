@@ -2,7 +2,7 @@
 
 python launch/benchmark.py --what=environment
 python launch/benchmark.py --what=learner --preset=fast
-python launch/benchmark.py --what=training --config.actor_process
+python launch/benchmark.py --what=training --preset=fast
 python launch/benchmark.py --what=memory --steps=20000
 python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
@@ -31,7 +31,7 @@ _WHAT = flags.DEFINE_enum(
   "environment",
   list(_DEFAULT_STEPS),
   "environment: control steps a second through dm_env, the physics' alone, a "
-  "reset's time, environments side by side. learner: updates a second, against "
+  "reset's time. learner: updates a second, against "
   "matrix products. training: the whole loop, against the learner alone. "
   "memory: with a full replay on disk. stability: random steps that count NaN, "
   "MuJoCo's warnings and lost blocks.",

@@ -8,6 +8,7 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics, seeding
+from lfgp_dmc.acting import environments
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.pictures import recorder, task_switch
 from lfgp_dmc.runs import checkpoints, run_folder
@@ -16,11 +17,11 @@ SCHEDULED = "scheduled"
 
 
 class Stage:
-  """A cast in its environment; each clip depends on its seed alone."""
+  """A policy in its environment; each clip depends on its seed alone."""
 
   def __init__(
     self,
-    cast: policies.Cast,
+    spec: policies.PolicySpec,
     task: str,
     look: recorder.Look,
     is_play: bool = False,
@@ -28,7 +29,7 @@ class Stage:
     """Builds the environment.
 
     Args:
-      cast: the policy.
+      spec: the policy.
       task: an intention, or `SCHEDULED`.
       look: how frames are made.
       is_play: whether the expert goes from task to task.
@@ -39,9 +40,9 @@ class Stage:
     if fault := graphics.fault():
       raise command.UserError(fault)
     if task == SCHEDULED:
-      look = dataclasses.replace(look, scheduled_for=cast.main_task)
-    self._cast, self._task, self._is_play = cast, task, is_play
-    self._look, self._environment = look, cast.world.build()
+      look = dataclasses.replace(look, scheduled_for=spec.main_task)
+    self._spec, self._task, self._is_play = spec, task, is_play
+    self._look, self._environment = look, spec.world.build()
     with command.checked_input():
       recorder.prepare(self._environment, look)
 
@@ -56,49 +57,43 @@ class Stage:
     Raises:
       UserError: there is no scheduler to choose by.
     """
-    environment: Any = self._environment
-    derived = seeding.derive(seed, "clip")
-    if hasattr(environment, "reseed"):
-      environment.reseed(derived)
-    else:
-      environment.close()
-      self._environment = environment = self._cast.world.build(seed=derived)
+    environment: Any = environments.reseeded(
+      self._environment,
+      self._spec.world.factory(),
+      seeding.derive(seed, "clip"),
+    )
+    self._environment = environment
     switch = task_switch.one_task(self._task)
     if self._is_play:
-      tasks = lfgp_dmc.task_set(self._cast.main_task)
+      tasks = lfgp_dmc.task_set(self._spec.main_task)
       switch = task_switch.Play(environment, tasks, seed)
     elif self._task == SCHEDULED:
-      switch = scheduled(self._cast, seed)
+      switch = scheduled(self._spec, seed)
     look = dataclasses.replace(self._look, every=every)
-    first, actor = environment.reset(), self._cast.make()
+    first, actor = environment.reset(), self._spec.make()
     return recorder.record(
       environment, actor, first, switch, seed, look, **limits
     )
 
 
-def scheduled(cast: policies.Cast, seed: int) -> recorder.Switch:
+def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
   """The run's own scheduler, as of its last checkpoint.
 
   Raises:
     UserError: a policy folder has no scheduler.
   """
-  if cast.folder is None or "agent" not in cast.config:
+  if spec.folder is None or "agent" not in spec.config:
     raise command.UserError("--task=scheduled needs the folder of a whole run")
   from lfgp_dmc.agents.schedulers import make_scheduler
   from lfgp_dmc.launch import configs
 
-  stored = {
-    name: value
-    for name, value in cast.config.items()
-    if name not in run_folder.ADDED_FIELDS
-  }
   with command.checked_input():
-    agent = configs.from_dict(stored).agent
+    agent = configs.from_dict(run_folder.settings(spec.config)).agent
     periods = -(-agent.episode_steps // agent.xi)
     scheduler = make_scheduler(
-      agent, cast.tasks, 0, periods, np.random.default_rng(seed)
+      agent, spec.tasks, 0, periods, np.random.default_rng(seed)
     )
-  path = checkpoints.latest(run_folder.RunFolder(cast.folder).checkpoints)
+  path = checkpoints.latest(run_folder.RunFolder(spec.folder).checkpoints)
   if path is not None:
     scheduler.load_state_dict(checkpoints.load(path)["agent"]["scheduler"])
   scheduler.begin_episode()
@@ -107,7 +102,7 @@ def scheduled(cast: policies.Cast, seed: int) -> recorder.Switch:
   def choose(step: int, timestep: dm_env.TimeStep) -> str:
     nonlocal chosen
     if step % agent.xi == 0:
-      chosen = cast.tasks[scheduler.next_task()]
+      chosen = spec.tasks[scheduler.next_task()]
     return chosen
 
   return choose

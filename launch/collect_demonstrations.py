@@ -12,8 +12,9 @@ from absl import flags
 
 import lfgp_dmc
 from lfgp_dmc.acting import collection
-from lfgp_dmc.acting.attempts import Plan
+from lfgp_dmc.acting.attempts import CollectionPlan
 from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
@@ -33,10 +34,10 @@ _FINALS = flags.DEFINE_integer(
   "journal version's 1000 pairs: --pairs_per_task=800 --final_pairs=200.",
 )
 _LONGEST = flags.DEFINE_integer(
-  "longest_of",
+  "keep_longest_of",
   1,
-  "Of so many attempts keep the longest: starts that take more doing are shown "
-  "more often. With --collection=reset.",
+  "Keep the longest of so many attempts: hard starts are over-sampled. With "
+  "--collection=reset.",
 )
 _SEED = flags.DEFINE_integer("seed", 0, "Everything random follows from it.")
 _OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
@@ -60,36 +61,11 @@ def sampling_actor(make_policy) -> Actor:
 
 
 def main() -> int:
-  """Collects, writes and tells what it wrote."""
+  """Collects, writes and prints what it wrote."""
   output, tasks = _check_flags()
-  cast = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
-  make_actor = cast.make
-  if _EXPERT.value != policies.SCRIPTED:
-    make_actor = functools.partial(sampling_actor, cast.make)
-  all_tasks = lfgp_dmc.task_set(_TASK.value)
-  if cast.world.control_hz != _HERTZ.value:
-    raise command.UserError(
-      f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
-      f"{cast.world.control_hz} Hz"
-    )
-  lacking = [task for task in all_tasks if task not in cast.tasks]
-  if lacking:
-    raise command.UserError(
-      f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
-      f"--task={_TASK.value}; it can do: {', '.join(cast.tasks)}"
-    )
-  plan = Plan(
-    functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),
-    make_actor,
-    _TASK.value,
-    all_tasks,
-    _SEED.value,
-    _HERTZ.value,
-    longest_of=_LONGEST.value,
-  )
   try:
     found = collection.collect(
-      plan,
+      _plan(),
       _COLLECTION.value,
       tasks,
       _PAIRS.value,
@@ -98,8 +74,9 @@ def main() -> int:
     )
   except collection.NoSuccessError as error:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
-  _write(output, found)
-  print(f"{demonstrations.summary_table(_data(found))}\n")
+  data = {task: part.demonstrations for task, part in found.items()}
+  _write(output, data)
+  print(f"{demonstrations.summary_table(data)}\n")
   what = "attempts"
   if _LONGEST.value > 1:
     what = f"choices of {_LONGEST.value} attempts"
@@ -112,6 +89,39 @@ def main() -> int:
   return 0
 
 
+def _plan() -> CollectionPlan:
+  """Who plays what, where.
+
+  Raises:
+    UserError: the expert cannot do all tasks, or acts at another rate.
+  """
+  spec = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
+  make_actor = spec.make
+  if _EXPERT.value != policies.SCRIPTED:
+    make_actor = functools.partial(sampling_actor, spec.make)
+  tasks = lfgp_dmc.task_set(_TASK.value)
+  if spec.world.control_hz != _HERTZ.value:
+    raise command.UserError(
+      f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
+      f"{spec.world.control_hz} Hz"
+    )
+  lacking = [task for task in tasks if task not in spec.tasks]
+  if lacking:
+    raise command.UserError(
+      f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
+      f"--task={_TASK.value}; it can do: {', '.join(spec.tasks)}"
+    )
+  return CollectionPlan(
+    functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),
+    make_actor,
+    _TASK.value,
+    tasks,
+    _SEED.value,
+    _HERTZ.value,
+    keep_longest_of=_LONGEST.value,
+  )
+
+
 def _check_flags() -> tuple[pathlib.Path, list[str]]:
   """The output folder and the tasks to collect."""
   command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
@@ -119,11 +129,11 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
   command.check_least("final_pairs", _FINALS.value, 0)
-  command.check_least("longest_of", _LONGEST.value, 1)
+  command.check_least("keep_longest_of", _LONGEST.value, 1)
   if _LONGEST.value > 1 and _COLLECTION.value != "reset":
     raise command.UserError(
-      f"--longest_of={_LONGEST.value}; valid: 1 with --collection=play (its "
-      "attempts follow from one another)"
+      f"--keep_longest_of={_LONGEST.value}; valid: 1 with --collection=play "
+      "(its attempts follow from one another)"
     )
   command.check_least("seed", _SEED.value, 0)
   command.check_least("workers", _WORKERS.value, 0)
@@ -146,18 +156,12 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   return output, tasks
 
 
-def _data(found: dict[str, collection.Collected]):
-  return {task: part.demonstrations for task, part in found.items()}
-
-
-def _write(
-  output: pathlib.Path, found: dict[str, collection.Collected]
-) -> None:
+def _write(output: pathlib.Path, data: dict[str, Demonstrations]) -> None:
   """Writes the dataset aside, then gives it its name: whole or not at all."""
   prefix = f".{output.name}.partial."
   with tempfile.TemporaryDirectory(prefix=prefix, dir=output.parent) as aside:
     folder = demonstrations.create_folder(pathlib.Path(aside) / output.name)
-    for task, data in _data(found).items():
+    for task, pairs in data.items():
       attributes = {
         "task": task,
         "main_task": _TASK.value,
@@ -167,7 +171,7 @@ def _write(
         "control_hz": _HERTZ.value,
       }
       path = folder / (task + demonstrations.SUFFIX)
-      demonstrations.write(path, data, attributes)
+      demonstrations.write(path, pairs, attributes)
     if output.exists():
       raise command.UserError(f"--output={output} appeared meanwhile")
     os.rename(folder, output)

@@ -78,7 +78,6 @@ def _read(
   folder: pathlib.Path, tasks: Sequence[str], widths: tuple[int, int]
 ) -> dict[str, Demonstrations]:
   """Reads our own files, or a folder of published examples of success."""
-  # The room of the tasks imports MuJoCo, whose backend is chosen before.
   from lfgp_dmc.tasks import published_examples
 
   if published_examples.is_folder_of_examples(folder):

@@ -2,11 +2,10 @@
 
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
-This is what `make demo` runs. It ends in one table of success on the same
-resets (untrained agent, its warm start by behaviour cloning, trained agent, a
-stored policy that was trained for longer, and the expert that they learned
-from), a figure, and a video that ends with the stored policy, in a new folder
-under runs/.
+This is `make demo`. It ends, in a new folder under runs/, in a table of success
+on the same resets (untrained agent, its warm start by cloning, trained agent,
+a stored policy trained for longer, the expert), a learning curve, and a video
+whose last clip is of the stored policy.
 """
 
 import dataclasses
@@ -22,10 +21,11 @@ from absl import flags
 
 from lfgp_dmc import graphics, seeding, task_names
 from lfgp_dmc.acting import evaluation
-from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import figures, run_results
@@ -54,22 +54,16 @@ def main() -> int:
   start = time.monotonic()
   with command.checked_input():
     config = config_flags.resolved()
-  path = pathlib.Path(_RUN.value) if _RUN.value else _default_path(config)
+  path = pathlib.Path(_RUN.value)
+  if not _RUN.value:
+    path = run_folder.default_path("quickstart", config.main_task)
   stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
   progress = training.train(config, path)
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
-  rows = evaluation.read_csv(path / "evaluation.csv")
-  trained = [row for row in rows if row.env_step == progress.env_step]
-  columns = {
-    "untrained": _evaluate_untrained(config),
-    "warm start": [row for row in rows if row.env_step == 0],
-    "trained": trained,
-    **({"stored": _evaluate_stored(config, stored)} if stored else {}),
-    "expert": _evaluate_expert(config),
-  }
+  columns = _columns(config, path, stored)
   figure = path / "learning_curve.png"
   figures.learning_curve(run_results.read_runs([path])[0], figure)
   clip = _film(config, path, columns, stored)
@@ -90,7 +84,8 @@ def table(
 ) -> str:
   """Success by task, the columns side by side."""
   rates = {
-    name: evaluation.success_rates(list(rows)) for name, rows in columns.items()
+    name: evaluation_csv.success_rates(list(rows))
+    for name, rows in columns.items()
   }
   lines = [
     f"success on the same {config.evaluation_episodes} resets of "
@@ -104,24 +99,33 @@ def table(
   return "\n".join(lines)
 
 
-def _default_path(config: RunConfig) -> pathlib.Path:
-  return run_folder.default_path("quickstart", config.main_task)
-
-
-def _evaluate_untrained(config: RunConfig) -> list[EvaluationRow]:
-  print("evaluating the untrained agent on the same resets", flush=True)
+def _columns(
+  config: RunConfig, path: pathlib.Path, stored: policies.PolicySpec | None
+) -> dict[str, list[EvaluationRow]]:
+  """The table's columns: every policy on the same resets."""
+  rows = evaluation_csv.read_csv(path / "evaluation.csv")
+  last = max(row.env_step for row in rows)
+  tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
-    return _evaluate(config, functools.partial(policies.stored_policy, folder))
+    make = functools.partial(policies.stored_policy, folder)
+    untrained = _evaluate(config, "the untrained agent", make, tasks)
+  columns = {
+    "untrained": untrained,
+    "warm start": [row for row in rows if row.env_step == 0],
+    "trained": [row for row in rows if row.env_step == last],
+  }
+  if stored is not None:
+    able = [task for task in tasks if task in stored.tasks]
+    world = _world(config, stored)
+    name = str(stored.folder)
+    columns["stored"] = _evaluate(config, name, stored.make, able, world)
+  make = functools.partial(policies.scripted_expert, config.control_hz)
+  columns["expert"] = _evaluate(config, "the scripted expert", make, tasks)
+  return columns
 
 
-def _evaluate_expert(config: RunConfig) -> list[EvaluationRow]:
-  print("evaluating the scripted expert on the same resets", flush=True)
-  expert = functools.partial(policies.scripted_expert, config.control_hz)
-  return _evaluate(config, expert)
-
-
-def _stored_policy(main_task: str) -> policies.Cast | None:
+def _stored_policy(main_task: str) -> policies.PolicySpec | None:
   """The policy to show beside the fresh one, if there is any.
 
   Raises:
@@ -130,38 +134,32 @@ def _stored_policy(main_task: str) -> policies.Cast | None:
   folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
-  cast = policies.find(folder, "")
-  if main_task not in cast.tasks:
+  spec = policies.find(folder, "")
+  if main_task not in spec.tasks:
     raise command.UserError(
       f"--stored={folder} cannot do {main_task}; it can do: "
-      f"{', '.join(cast.tasks)}"
+      f"{', '.join(spec.tasks)}"
     )
-  return cast
+  return spec
 
 
-def _evaluate_stored(
-  config: RunConfig, stored: policies.Cast
-) -> list[EvaluationRow]:
-  print(f"evaluating {stored.folder} on the same resets", flush=True)
-  able = [t for t in task_names.task_set(config.main_task) if t in stored.tasks]
-  return _evaluate(config, stored.make, _world(config, stored), able)
-
-
-def _world(config: RunConfig, stored: policies.Cast) -> World:
+def _world(config: RunConfig, stored: policies.PolicySpec) -> EnvironmentSpec:
   """The run's environment, at the control rate of the stored policy."""
   return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
 
 
 def _evaluate(
   config: RunConfig,
+  name: str,
   make_actor: Callable[[], Actor],
-  world: World | None = None,
-  tasks: Sequence[str] = (),
+  tasks: Sequence[str],
+  world: EnvironmentSpec | None = None,
 ) -> list[EvaluationRow]:
+  print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(
     (world or config.world).factory(show_rewards=True),
     make_actor,
-    tasks or task_names.task_set(config.main_task),
+    tasks,
     config.evaluation_episodes,
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
@@ -172,7 +170,7 @@ def _film(
   config: RunConfig,
   path: pathlib.Path,
   columns: Mapping[str, Sequence[EvaluationRow]],
-  stored: policies.Cast | None,
+  stored: policies.PolicySpec | None,
 ) -> pathlib.Path | None:
   """Renders evaluated episodes again: of the main task, then of others.
 
@@ -203,7 +201,7 @@ def _film(
 
 
 def _play(
-  world: World, actor: Actor, episodes: Sequence[EvaluationRow]
+  world: EnvironmentSpec, actor: Actor, episodes: Sequence[EvaluationRow]
 ) -> list[np.ndarray]:
   """The frames of evaluated episodes, played again."""
   environment: Any = world.build()

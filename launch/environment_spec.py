@@ -12,11 +12,9 @@ import lfgp_dmc
 from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.task_names import check_task
 
-_REWARD = "reward/"
-
 
 @dataclasses.dataclass(frozen=True)
-class World:
+class EnvironmentSpec:
   """What it takes to build an environment; picklable.
 
   Attributes:
@@ -47,13 +45,12 @@ class World:
       if seed is not None and "seed" in inspect.signature(make).parameters:
         return make(seed=seed)
       return make()
-    built = lfgp_dmc.load(self.main_task, seed, control_hz=self.control_hz)
-    if show_rewards:
-      for name, observable in built.task.observables.items():
-        if name.startswith(_REWARD):
-          observable.enabled = True
-      built.reset()  # from here on, its specification tells of them too
-    return built
+    return lfgp_dmc.load(
+      self.main_task,
+      seed,
+      control_hz=self.control_hz,
+      show_rewards=show_rewards,
+    )
 
   def factory(
     self, show_rewards: bool = False

@@ -14,6 +14,7 @@ from absl import flags
 
 import lfgp_dmc
 from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.task_names import CONTROL_RATES
@@ -53,28 +54,28 @@ def main() -> None:
   command.check_least("workers", _WORKERS.value, 0)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
-  rows: list[evaluation.EvaluationRow] = []
-  for cast, tasks in _plan():
+  rows: list[evaluation_csv.EvaluationRow] = []
+  for spec, tasks in _plan():
     rows += evaluation.evaluate(
-      cast.world.factory(show_rewards=True),
-      cast.make,
+      spec.world.factory(show_rewards=True),
+      spec.make,
       tasks,
       _EPISODES.value,
       _SEED.value,
       _WORKERS.value or command.cores(),
-      env_step=cast.env_step,
+      env_step=spec.env_step,
     )
-  print(evaluation.success_table(rows))
+  print(evaluation_csv.success_table(rows))
   if output is not None:
     add_rows(output, rows)
     print(f"\n{output}")
 
 
-def _plan() -> list[tuple[policies.Cast, tuple[str, ...]]]:
+def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
   """Who plays which tasks; an expert each task in its own environment."""
   if _RUN.value or not _EXPERT.value:
-    cast = policies.find(_RUN.value, _EXPERT.value)
-    return [(cast, choose_tasks(_TASKS.value, cast.tasks))]
+    spec = policies.find(_RUN.value, _EXPERT.value)
+    return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
   command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   own = _MAIN_TASK.value
   if own:
@@ -88,7 +89,7 @@ def _plan() -> list[tuple[policies.Cast, tuple[str, ...]]]:
   return [(_scripted(task), (task,)) for task in tasks]
 
 
-def _scripted(task: str) -> policies.Cast:
+def _scripted(task: str) -> policies.PolicySpec:
   return policies.find("", policies.SCRIPTED, task, _HERTZ.value)
 
 
@@ -127,7 +128,7 @@ def _output() -> pathlib.Path | None:
 
 
 def add_rows(
-  path: pathlib.Path, rows: Sequence[evaluation.EvaluationRow]
+  path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
 ) -> None:
   """Appends the rows that the file does not have; makes it if missing.
 
@@ -136,9 +137,9 @@ def add_rows(
   """
   path.parent.mkdir(parents=True, exist_ok=True)
   with command.checked_input():
-    known = evaluation.read_csv(path) if path.exists() else []
+    known = evaluation_csv.read_csv(path) if path.exists() else []
   keys = {row[:4] for row in known}  # env_step, task, episode, seed
-  evaluation.append_csv(path, [row for row in rows if row[:4] not in keys])
+  evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
 
 
 if __name__ == "__main__":

@@ -8,14 +8,12 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.types import Actor
 
@@ -24,12 +22,12 @@ _ARRAYS = "policy.safetensors"
 
 
 @dataclasses.dataclass(frozen=True)
-class Cast:
+class PolicySpec:
   """An actor to be made, and where it is at home."""
 
   make: Callable[[], Actor]  # picklable
   name: str  # for tables and sidecars
-  world: World
+  world: EnvironmentSpec
   tasks: tuple[str, ...]  # what it can do, the main task first
   folder: pathlib.Path | None = None  # of a run
   config: dict[str, Any] = dataclasses.field(default_factory=dict)
@@ -45,7 +43,7 @@ def scripted_expert(control_hz: int = 20) -> Actor:
   """Makes the scripted expert of all nine tasks."""
   from lfgp_dmc.tasks import experts
 
-  return experts.make_expert(control_hz=control_hz)
+  return experts.ScriptedExpert(control_hz=control_hz)
 
 
 def stored_policy(folder: str) -> Actor:
@@ -58,21 +56,9 @@ def stored_policy(folder: str) -> Actor:
   return Policy.load(folder)
 
 
-def sampling_policy(
-  options: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
-) -> Actor:
-  """The policy of a learner's arrays, that samples its actions."""
-  import torch
-
-  from lfgp_dmc.agents.policy import Policy
-
-  torch.set_num_threads(1)
-  policy = Policy.from_arrays(arrays, options)
-  policy.deterministic = False
-  return policy
-
-
-def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
+def find(
+  run: str, expert: str, task: str = "", control_hz: int = 20
+) -> PolicySpec:
   """The actor that `--run` or `--expert` names.
 
   Args:
@@ -90,11 +76,13 @@ def find(run: str, expert: str, task: str = "", control_hz: int = 20) -> Cast:
     task = task or lfgp_dmc.MAIN_TASKS[0]
     tasks = (task, *(t for t in lfgp_dmc.ALL_TASKS if t != task))
     make = functools.partial(scripted_expert, control_hz)
-    return Cast(make, "scripted expert", World(task, "", control_hz), tasks)
+    return PolicySpec(
+      make, "scripted expert", EnvironmentSpec(task, "", control_hz), tasks
+    )
   return _of_folder(run or expert)
 
 
-def _of_folder(folder: str) -> Cast:
+def _of_folder(folder: str) -> PolicySpec:
   path = pathlib.Path(folder)
   try:
     config = run_folder.read_config(path)
@@ -102,13 +90,13 @@ def _of_folder(folder: str) -> Cast:
       raise ValueError(f"no policy in {path}: {path / _ARRAYS} is missing")
     policy: Any = stored_policy(folder)
     main_task = config.get("main_task", policy.tasks[0])
-    world = World(
+    world = EnvironmentSpec(
       main_task, config.get("environment", ""), config.get("control_hz", 20)
     )
     world.check()
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
-  return Cast(
+  return PolicySpec(
     functools.partial(stored_policy, os.fspath(path)),
     path.name,
     world,

@@ -103,12 +103,12 @@ def main() -> None:
 def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
   """An episode, or a grid of them."""
   is_play = _COLLECTION.value == "play"
-  cast = policies.find(_RUN.value, _EXPERT.value, _TASK.value, _HERTZ.value)
-  task = _TASK.value or cast.main_task
-  command.check_choice("task", task, (*cast.tasks, clips.SCHEDULED))
-  output = _output(f"{cast.name}_{'play' if is_play else task}")
-  stage = clips.Stage(cast, task, look, is_play)
-  goal = cast.main_task if task == clips.SCHEDULED else task
+  spec = policies.find(_RUN.value, _EXPERT.value, _TASK.value, _HERTZ.value)
+  task = _TASK.value or spec.main_task
+  command.check_choice("task", task, (*spec.tasks, clips.SCHEDULED))
+  output = _output(f"{spec.name}_{'play' if is_play else task}")
+  stage = clips.Stage(spec, task, look, is_play)
+  goal = spec.main_task if task == clips.SCHEDULED else task
   steps, until = _STEPS.value or None, goal if _UNTIL.value else None
   played = [
     stage.play(seed, look.every, max_steps=steps, until_success_of=until)
@@ -124,12 +124,12 @@ def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
     for seed, clip in zip(seeds, played, strict=True)
   ]
   metadata = {
-    "actor": cast.name,
+    "actor": spec.name,
     "task": task,
-    "main_task": cast.main_task,
+    "main_task": spec.main_task,
     "collection": _COLLECTION.value,
     "camera": look.camera,
-    "env_step": cast.env_step,
+    "env_step": spec.env_step,
     **shown[0],
     **({"grid": shown} if len(shown) > 1 else {}),
   }
@@ -147,23 +147,23 @@ def _film_strips(look: recorder.Look) -> None:
   """A row of frames for each main task."""
   if _EXPERT.value:
     tasks = [_TASK.value] if _TASK.value else lfgp_dmc.MAIN_TASKS
-    casts = [policies.find("", _EXPERT.value, task) for task in tasks]
+    specs = [policies.find("", _EXPERT.value, task) for task in tasks]
   else:
-    casts = [policies.find(run, "") for run in _RUN.value.split(",")]
+    specs = [policies.find(run, "") for run in _RUN.value.split(",")]
   output = _output("strips", (".png",))
   seeds = range(_SEED.value, _SEED.value + _ATTEMPTS.value)
   cells, shown = [], []
-  for cast in casts:
-    task = cast.main_task
-    stage = clips.Stage(cast, task, look)
+  for spec in specs:
+    task = spec.main_task
+    stage = clips.Stage(spec, task, look)
     try:
       row, seed, step = film_strips.row(stage.play, task, seeds, _STRIP.value)
     except ValueError as error:
       raise UserError(
-        f"{cast.name}: {error}; try more --attempts or another --seed"
+        f"{spec.name}: {error}; try more --attempts or another --seed"
       ) from None
     cells += [[frame] for frame in row]
-    shown.append({"task": task, "actor": cast.name, "seed": seed,
+    shown.append({"task": task, "actor": spec.name, "seed": seed,
                   "success_at": step})  # fmt: skip
   video.write(output, video.grid(cells, _STRIP.value), metadata={"rows": shown})
   print(output)

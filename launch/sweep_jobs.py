@@ -11,8 +11,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.task_names import ALL_TASKS
 
@@ -191,7 +190,7 @@ def _last_success(folder: pathlib.Path) -> tuple[str, str]:
   """The last evaluation of the main task: its step, and share of successes."""
   try:
     main_task = run_folder.read_config(folder).get("main_task")
-    rows = evaluation.read_csv(folder / "evaluation.csv")
+    rows = evaluation_csv.read_csv(folder / "evaluation.csv")
   except (OSError, ValueError, csv.Error):
     return "", ""
   rows = [row for row in rows if row.task == main_task]

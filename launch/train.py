@@ -12,10 +12,11 @@ import pathlib
 
 from absl import flags
 
-from lfgp_dmc.acting import evaluation
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, config_flags, configs, training
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.runs import loop, run_folder
+from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.schedule import Progress
 
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
@@ -38,7 +39,7 @@ def main() -> int:
 
 
 def report(
-  config: configs.RunConfig, path: pathlib.Path, progress: loop.Progress
+  config: configs.RunConfig, path: pathlib.Path, progress: Progress
 ) -> int:
   """Prints the last evaluation and the places; returns the exit status."""
   if not progress.is_complete:
@@ -47,12 +48,14 @@ def report(
       f"python launch/train.py --run={path} --resume"
     )
     return command.INTERRUPTED
-  rows = evaluation.read_csv(path / "evaluation.csv")
+  rows = evaluation_csv.read_csv(path / "evaluation.csv")
   is_supervised = configs.ALGORITHMS[config.algorithm].is_supervised
   unit = "updates" if is_supervised else "environment steps"
   print(f"\nsuccess after {progress.env_step} {unit}:")
   last = max(row.env_step for row in rows)
-  print(evaluation.success_table([row for row in rows if row.env_step == last]))
+  print(
+    evaluation_csv.success_table([row for row in rows if row.env_step == last])
+  )
   print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")
   print(f"evaluation   {path / 'evaluation.csv'}")
   print(f"policy       {path / 'policy.safetensors'}")
@@ -73,10 +76,8 @@ def _config() -> configs.RunConfig:
     if config_flags.is_given():
       return config_flags.resolved()
     stored = run_folder.read_config(_RUN.value)
-    for name in run_folder.ADDED_FIELDS:
-      stored.pop(name, None)
     try:
-      return configs.from_dict(stored)
+      return configs.from_dict(run_folder.settings(stored))
     except ValueError as error:
       raise UserError(f"{_RUN.value}/config.json: {error}") from None
 

@@ -14,7 +14,7 @@ import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
 from lfgp_dmc.launch import command, policies
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 
 _TASK = flags.DEFINE_string(
   "task", "", "The task to look at; with --run, the intention that acts."
@@ -26,30 +26,30 @@ _SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
 
 def main() -> None:
   """Opens the window."""
-  task, cast = _TASK.value, None
+  task, spec = _TASK.value, None
   if task and not _RUN.value:
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
   if _EXPERT.value:
     command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   if _RUN.value or _EXPERT.value:
-    cast = policies.find(_RUN.value, _EXPERT.value, task)
-    task = command.check_choice("task", task or cast.main_task, cast.tasks)
+    spec = policies.find(_RUN.value, _EXPERT.value, task)
+    task = command.check_choice("task", task or spec.main_task, spec.tasks)
   if not graphics.has_display():
     raise command.UserError(
       "the viewer needs a display, and there is none (DISPLAY is not set); "
       "without one, launch/render_policy.py makes videos"
     )
-  _open(cast, task or lfgp_dmc.MAIN_TASKS[0])
+  _open(spec, task or lfgp_dmc.MAIN_TASKS[0])
 
 
-def _open(cast: policies.Cast | None, task: str) -> None:
+def _open(spec: policies.PolicySpec | None, task: str) -> None:
   from dm_control import viewer
 
-  world = cast.world if cast else World(task)
+  world = spec.world if spec else EnvironmentSpec(task)
   environment = world.build(seed=_SEED.value)
   policy = None
-  if cast:
-    actor, flatten = cast.make(), environments.flattener(environment)
+  if spec:
+    actor, flatten = spec.make(), environments.flattener(environment)
 
     def policy(timestep) -> np.ndarray:
       if timestep.first():

@@ -6,14 +6,13 @@
     timestep = environment.reset()
     action = act(lfgp_dmc.flatten(timestep.observation))
 
-This facade is the one file of the core that reaches `tasks` and `agents`, and
-only inside its functions: importing it loads neither a simulator nor torch.
+This facade reaches `tasks` and `agents` inside its functions only: importing it
+loads neither a simulator nor torch.
 """
 
-import functools
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import dm_env
 import numpy as np
@@ -28,9 +27,6 @@ from lfgp_dmc.observations import (
 )
 from lfgp_dmc.task_names import ALL_TASKS, AUXILIARY_TASKS, MAIN_TASKS, task_set
 
-if TYPE_CHECKING:
-  from lfgp_dmc.vector import VectorEnvironment
-
 __all__ = [
   "ALL_TASKS",
   "AUXILIARY_TASKS",
@@ -41,7 +37,6 @@ __all__ = [
   "flatten",
   "load",
   "load_policy",
-  "load_vector",
   "successes",
   "task_set",
 ]
@@ -57,7 +52,7 @@ def load(
     seed: fixes everything random in the environment; None draws a fresh seed.
     **options: `reward` ("sparse" or "dense"), `observations` ("features" or
       "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20),
-      `time_limit` (18.0 s); see `tasks.load`.
+      `time_limit` (18.0 s), `show_rewards` (False); see `tasks.load`.
 
   Returns:
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
@@ -69,36 +64,6 @@ def load(
   from lfgp_dmc import tasks
 
   return tasks.load(task, seed=seed, **options)
-
-
-def load_vector(
-  task: str, count: int, seed: int = 0, **options: Any
-) -> "VectorEnvironment":
-  """Builds environments side by side, each in a process of its own.
-
-  Args:
-    task: a name in `ALL_TASKS`.
-    count: W, how many.
-    seed: environment i goes through the states of `load(task, seed + i)`.
-    **options: as for `load`.
-
-  Returns:
-    A `VectorEnvironment`; see `lfgp_dmc/vector.py`. `close` it, or use it in a
-    `with` statement. A script that does so needs the usual
-    `if __name__ == "__main__":` of multiprocessing.
-
-  Raises:
-    ValueError: a count below 1.
-    RuntimeError: an environment could not be built; its process tells why.
-  """
-  from lfgp_dmc.vector import VectorEnvironment
-
-  return VectorEnvironment(
-    [
-      functools.partial(load, task, seed + index, **options)
-      for index in range(count)
-    ]
-  )
 
 
 def load_policy(

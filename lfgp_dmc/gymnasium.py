@@ -7,8 +7,8 @@
     observation, info = env.reset(seed=0)
 
 `gymnasium.make("lfgp_dmc.gymnasium:lfgp_dmc/Stack-v0")` needs no second import.
-Options are those of `lfgp_dmc.load`. What the environments give is told in
-`tasks/gymnasium_environment.py`; nothing of that is loaded before it is made.
+Options are those of `lfgp_dmc.load`; observations and `info` are described in
+`tasks/gymnasium_environment.py`, which is imported by the first environment.
 """
 
 import gymnasium
@@ -16,7 +16,7 @@ import gymnasium
 from lfgp_dmc.task_names import ALL_TASKS
 
 NAMESPACE = "lfgp_dmc"
-_MAKE = "lfgp_dmc.tasks.gymnasium_environment:make"
+_MAKE = "lfgp_dmc.tasks.gymnasium_environment:BlockEnvironment"
 
 
 def environment_id(task: str) -> str:

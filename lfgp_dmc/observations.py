@@ -1,8 +1,7 @@
-"""The 59 floats that every task and every agent share: one layout, one place.
+"""The layout of the 59 floats that all tasks and agents share.
 
-The order is the released code's, so that published data line up. An
-observation of our environments also carries `success/<task>` and
-`condition/<task>`, which are not part of the 59.
+The order is the released code's, so that published data line up. Observations
+also carry `success/<task>` and `condition/<task>`, which are not of the 59.
 """
 
 from collections.abc import Mapping
@@ -57,6 +56,7 @@ OBSERVATION_SLICES: dict[str, Component] = {
 
 SUCCESS_PREFIX = "success/"
 CONDITION_PREFIX = "condition/"
+REWARD_PREFIX = "reward/"  # of a task; see `acting/environments.py`
 
 
 # The components one after the other: where each starts and ends, where in the
@@ -89,11 +89,10 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   """Lays the named observables out in the order of the released code.
 
   Args:
-    observation: a timestep's observation with all eleven components; those of
-      a vector environment have W in front.
+    observation: a timestep's observation with all eleven components.
 
   Returns:
-    float32 [59], or [W, 59].
+    float32 [59].
 
   Raises:
     KeyError: a component is missing (vision leaves the privileged ones out).
@@ -105,7 +104,7 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
       f"observation lacks {error}; the 59 floats need "
       f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
     ) from None
-  return np.concatenate(parts, axis=-1, dtype=np.float32)[..., _FLAT]
+  return np.concatenate(parts, dtype=np.float32)[_FLAT]
 
 
 def successes(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:

@@ -1,8 +1,7 @@
 """A point that walks to a goal: the smallest environment of our contract.
 
-Two tasks on a line in the plane, with the same observables, holds and calls as
-the nine block tasks, in microseconds: for tests, and as an example of what
-`config.environment` accepts.
+Two tasks with the observables and calls of the nine block tasks, in
+microseconds: for tests, and as an example of `config.environment`.
 """
 
 import dm_env

@@ -4,23 +4,22 @@ Shapes are written `[B, K, A]`:
   B: batch rows.                 K: tasks, in the order of `task_set`.
   A: action dimensions (4).      O: observation dimensions (59).
   N: stored pairs or rows.       H: hidden units.
-  T: control steps.              W: environments side by side.
+  T: control steps.              R: tasks whose rewards the replay keeps.
 
 Units are SI (m, m/s, rad/s, N, N m); quaternions are w x y z.
 """
 
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import dm_env
 import numpy as np
 
 Metrics = dict[str, float]
-EnvironmentFactory = Callable[[], dm_env.Environment]
 
 
 class Transition(NamedTuple):
-  """One step as the replay stores it: raw, no reward baked in."""
+  """One step as the replay stores it, raw; or arrays of steps, [T, ...]."""
 
   observation: np.ndarray  # float32 [O]
   action: np.ndarray  # float32 [A]
@@ -28,20 +27,18 @@ class Transition(NamedTuple):
 
 
 class Step(NamedTuple):
-  """One step of an episode as the training loop gets it."""
+  """One step of an episode."""
 
   transition: Transition
-  rewards: np.ndarray | None  # float32 [R] if the replay keeps them
-  is_last: bool
-  is_physics_failure: bool
+  timestep: dm_env.TimeStep  # what the action led to
 
 
-class Period(NamedTuple):
-  """What a scheduler chose: some steps of one intention."""
+class Episode(NamedTuple):
+  """A finished episode of T steps, in order."""
 
-  task: str
-  steps: int
-  random_steps: int  # the first so many take actions from U[-1, 1]
+  observation: np.ndarray  # float32 [T, O]
+  action: np.ndarray  # float32 [T, A]
+  rewards: np.ndarray | None = None  # float32 [T, R] if the replay keeps them
 
 
 class Actor(Protocol):
@@ -54,10 +51,34 @@ class Actor(Protocol):
     """Maps one flat observation, float32 [O], to an action, float32 [A]."""
 
 
+@runtime_checkable
 class Agent(Protocol):
-  """A learner as the training loop sees it; see `lfgp_dmc/runs/loop.py`."""
+  """What a run trains; it is an `ActingAgent` or a `SupervisedAgent`."""
 
   tasks: tuple[str, ...]
+
+  def update(self) -> None:
+    """Makes one update of all networks."""
+
+  def metrics(self) -> Metrics:
+    """Means since the last call; the names stay the same."""
+
+  def policy_arrays(self) -> dict[str, np.ndarray]:
+    """What acting needs, by name: the content of `policy.safetensors`."""
+
+  def policy_options(self) -> dict[str, Any]:
+    """The JSON-able options that go with `policy_arrays`."""
+
+  def state_dict(self) -> dict[str, Any]:
+    """Arrays and JSON-able values: everything a resume needs but the replay."""
+
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned."""
+
+
+@runtime_checkable
+class ActingAgent(Agent, Protocol):
+  """Learns from what it does; see `lfgp_dmc/runs/loop.py`."""
 
   def prepare(self, progress_bar: bool) -> None:
     """Work before a new run's first step, such as a warm start; once."""
@@ -68,35 +89,20 @@ class Agent(Protocol):
   def act(self, observation: np.ndarray) -> np.ndarray:
     """Chooses the exploring action, float32 [A]; steps the scheduler."""
 
-  def next_period(self, env_step: int) -> Period:
-    """Steps the scheduler for an actor elsewhere; in place of `act`.
-
-    Args:
-      env_step: steps of the run before the period.
-    """
-
-  def end_episode(self, episode: "Episode") -> None:
+  def end_episode(self, episode: Episode) -> None:
     """Called once the episode is complete (the scheduler learns here)."""
 
-  def update(self) -> None:
-    """Makes one update of all networks from the replay and the experts."""
 
-  def metrics(self) -> Metrics:
-    """Means since the last call, by the names of the metrics contract."""
+@runtime_checkable
+class SupervisedAgent(Agent, Protocol):
+  """Learns from fixed data by epochs; see `lfgp_dmc/runs/supervised.py`."""
 
-  def policy_arrays(self) -> dict[str, np.ndarray]:
-    """What acting needs, by name: the content of `policy.safetensors`."""
+  @property
+  def has_converged(self) -> bool:
+    """Whether nothing more is to be gained; checked between epochs."""
 
-  def state_dict(self) -> dict[str, Any]:
-    """Arrays and JSON-able values: everything a resume needs but the replay."""
+  def begin_epoch(self) -> int:
+    """Shuffles the data; returns how many updates the epoch has."""
 
-  def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned."""
-
-
-class Episode(NamedTuple):
-  """A finished episode of T steps, in order."""
-
-  observation: np.ndarray  # float32 [T, O]
-  action: np.ndarray  # float32 [T, A]
-  rewards: np.ndarray | None = None  # float32 [T, R] if the replay keeps them
+  def end_epoch(self) -> None:
+    """Validates, also after an epoch that was cut by the run's end."""

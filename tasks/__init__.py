@@ -1,5 +1,81 @@
-"""The simulator side: entities, control, the nine tasks, scripted experts."""
+"""The simulator side: entities, control, the nine tasks, scripted experts.
 
-from lfgp_dmc.tasks.registry import load
+Importing this loads no simulator; building an environment does.
+"""
+
+from typing import TYPE_CHECKING
+
+from lfgp_dmc.task_names import CONTROL_RATES, check_task
+
+if TYPE_CHECKING:
+  from lfgp_dmc.tasks.environment import PlayEnvironment
 
 __all__ = ["load"]
+
+
+def load(
+  task: str,
+  seed: int | None = None,
+  *,
+  reward: str = "sparse",
+  observations: str = "features",
+  spawn: str = "published",
+  control_hz: int = 20,
+  time_limit: float = 18.0,
+  show_rewards: bool = False,
+  **unknown: object,
+) -> "PlayEnvironment":
+  """Makes the environment of a task.
+
+  Args:
+    task: one of the nine task names.
+    seed: of the environment's random state; None takes one from the system.
+    reward: "sparse" (1 while the task's condition holds, else 0) or "dense"
+      (the sum of the task's named terms).
+    observations: "features" (the eleven components) or "vision" (a camera,
+      84 x 84, and the components that a real robot senses).
+    spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
+    control_hz: 20, 10 or 5 control steps a second.
+    time_limit: length of an episode, s.
+    show_rewards: whether every task's dense reward is observed, as
+      `reward/<task>`.
+    **unknown: refused, with the options that there are.
+
+  Returns:
+    A `composer.Environment`.
+
+  Raises:
+    ValueError: an unknown name or a value out of range, with the valid ones.
+  """
+  from lfgp_dmc.tasks.environment import PlayEnvironment
+  from lfgp_dmc.tasks.play import PlayTask
+
+  check_task(task)
+  if unknown:
+    valid = ", ".join(load.__kwdefaults__ or ())
+    raise ValueError(f"unknown option {', '.join(unknown)}; valid: {valid}")
+  _check("reward", reward, ("sparse", "dense"))
+  _check("observations", observations, ("features", "vision"))
+  _check("spawn", spawn, ("published", "full_tray"))
+  _check("control_hz", control_hz, CONTROL_RATES)
+  _check("show_rewards", show_rewards, (False, True))
+  if not time_limit * control_hz >= 1:
+    raise ValueError(
+      f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
+    )
+  play = PlayTask(
+    task,
+    is_dense=reward == "dense",
+    has_camera=observations == "vision",
+    spawn=spawn,
+    control_hz=control_hz,
+    show_rewards=show_rewards,
+  )
+  return PlayEnvironment(play, seed, time_limit)
+
+
+def _check(name: str, value, valid) -> None:
+  if value not in valid:
+    raise ValueError(
+      f"unknown {name} {value!r}; valid: {', '.join(map(str, valid))}"
+    )

@@ -5,28 +5,37 @@ from dm_control import composer
 
 from lfgp_dmc.tasks import workspace as ws
 
+_PHYSICS_STEP = 0.005  # s
 _TABLE_HALF = (0.5, 0.75)  # m
 _TABLE_TOP_HALF = 0.015  # m
 _TABLE_CENTRE_Y = 0.45  # m
 
 FRONT_CAMERA = "front"
-THREE_QUARTER_CAMERA = "three_quarter"
 # Name, eye, target (m), vertical field of view (degrees).
 _CAMERAS = (
   (FRONT_CAMERA, (0.0, 1.02, 0.55), (0.0, 0.47, 0.15), 42),
-  (THREE_QUARTER_CAMERA, (0.80, 1.12, 0.66), (0.0, 0.37, 0.25), 35),
+  ("three_quarter", (0.80, 1.12, 0.66), (0.0, 0.37, 0.25), 35),
+)
+# Name, position (m), direction, diffuse and specular colour, casts a shadow.
+_LIGHTS = (
+  ("key", (0.75, 1.75, 1.9), (-0.4, -0.72, -1), (0.6, 0.59, 0.57), 0.2, True),
+  ("fill", (-0.9, 0.9, 1.2), (0.6, -0.3, -0.8), (0.22, 0.23, 0.26), 0, False),
 )
 
 
 class PlayArena(composer.Arena):
-  """A table under the tray; the robot's base stands at the origin."""
+  """A table under the tray; the robot's base stands at the origin.
+
+  Attributes:
+    table: its top, where a block that left the tray comes to rest.
+  """
 
   def _build(self, name: str = "play") -> None:
     super()._build(name)
     root = self.mjcf_model
     self._set_physics(root)
     self._set_look(root)
-    self._table = root.worldbody.add(
+    self.table = root.worldbody.add(
       "geom",
       name="table",
       type="box",
@@ -38,19 +47,17 @@ class PlayArena(composer.Arena):
       contype=0,
       conaffinity=0,
     )
-    self._add_cameras(root)
-
-  @property
-  def table(self):
-    """The table's top, where a block that left the tray comes to rest."""
-    return self._table
+    for name, eye, target, fovy in _CAMERAS:
+      root.worldbody.add(
+        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
+      )
 
   def _set_physics(self, root) -> None:
-    # Line-search iterations below the default let blocks fly off, and
-    # pyramidal cones let a grasp slip. So do the implicit integrators (5 mm in
-    # 10 s of moves, against 1 mm): the contact forces are solved before the
-    # servos' damping is, so that hand and block part a little at each start.
-    root.option.timestep = 0.005  # s
+    # Fewer line-search iterations let blocks fly off, and pyramidal cones let a
+    # grasp slip. So do the implicit integrators (5 mm in 10 s of moves, not
+    # 1 mm): they solve contact forces before the servos' damping, and hand and
+    # block part a little at each start.
+    root.option.timestep = _PHYSICS_STEP
     root.option.gravity = (0, 0, -9.81)  # m/s^2
     root.option.integrator = "Euler"
     root.option.solver = "Newton"
@@ -77,31 +84,16 @@ class PlayArena(composer.Arena):
       width=256,
       height=256,
     )
-    root.worldbody.add(
-      "light",
-      name="key",
-      pos=(0.75, 1.75, 1.9),
-      dir=(-0.4, -0.72, -1.0),
-      diffuse=(0.6, 0.59, 0.57),
-      specular=(0.2, 0.2, 0.2),
-      castshadow=True,
-      directional=False,
-    )
-    root.worldbody.add(
-      "light",
-      name="fill",
-      pos=(-0.9, 0.9, 1.2),
-      dir=(0.6, -0.3, -0.8),
-      diffuse=(0.22, 0.23, 0.26),
-      specular=(0, 0, 0),
-      castshadow=False,
-      directional=False,
-    )
-
-  def _add_cameras(self, root) -> None:
-    for name, eye, target, fovy in _CAMERAS:
+    for name, pos, direction, diffuse, specular, castshadow in _LIGHTS:
       root.worldbody.add(
-        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
+        "light",
+        name=name,
+        pos=pos,
+        dir=direction,
+        diffuse=diffuse,
+        specular=[specular] * 3,
+        castshadow=castshadow,
+        directional=False,
       )
 
 

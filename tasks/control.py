@@ -2,10 +2,9 @@
 
 The set-point is the activation of three integrating velocity servos that act
 on the TCP site, so accumulating, clipping to the box and servoing all happen
-inside MuJoCo at every physics step: `ctrl` is constant over a control step.
-Orientation is held pointing down by three position servos on the same site;
-gravity is compensated in the model. Gains are tuned to the released
-environment's response (see tests/tasks/control_test.py).
+inside MuJoCo at every physics step. Three position servos on the same site keep
+the hand pointing down; gravity is compensated in the model. The gains give the
+released environment's response (see tests/tasks/control_test.py).
 """
 
 import math
@@ -18,11 +17,10 @@ from lfgp_dmc.tasks.entities.panda import Panda
 from lfgp_dmc.tasks.entities.panda_links import FINGER_TRAVEL
 
 ACTION_SIZE = 4
-SPEED = 0.2  # m/s of the set-point at |a| = 1: 1 cm per 50 ms
 
-# Per axis, x y z: the arm's mass at the TCP differs between them, the response
-# wanted does not. Explicit integration (see arena.py) is stable while the
-# largest eigenvalue of timestep x mass^-1 x damping is below 2; it is 1.7.
+# Per axis, x y z, for equal responses despite unequal masses at the TCP.
+# Explicit integration (see arena.py) is stable while the largest eigenvalue of
+# timestep x mass^-1 x damping is below 2; it is 1.7.
 _POSITION_GAINS = (8000.0, 9800.0, 9000.0)  # N/m
 _POSITION_DAMPINGS = (760.0, 885.0, 835.0)  # N s/m
 _POSITION_FORCE = 150.0  # N
@@ -32,7 +30,9 @@ _ROTATION_TORQUE = 50.0  # N m
 _FINGER_GAIN = 600.0  # N/m
 _FINGER_DAMPING = 60.0  # N s/m
 _FINGER_FORCE = 10.0  # N
-_DOWN = (0.0, 1.0, 0.0, 0.0)  # pi about x: the hand points down
+DOWN = (0.0, 1.0, 0.0, 0.0)  # pi about x: the hand points down
+# The y and z axes of such a frame point against the base's.
+_SIGNS = (1.0, -1.0, -1.0)
 
 
 class SetPointControl:
@@ -45,65 +45,53 @@ class SetPointControl:
   def __init__(self, root: mjcf.RootElement, panda: Panda):
     """Adds the servos to the task's root, which holds the robot."""
     self._panda = panda
-    down = root.worldbody.add("site", name="down", quat=_DOWN, group=4)
-    actuator = root.actuator
-    self._position = []
-    self._rotation = []
-    # `down`'s y and z axes point against the base's, hence the signs.
-    signs = (1.0, -1.0, -1.0)
-    for axis, sign in enumerate(signs):
-      name = "xyz"[axis]
-      gear = np.zeros(6)
-      gear[axis] = sign
+    down = root.worldbody.add("site", name="down", quat=DOWN, group=4)
+    sites = {"site": panda.tcp, "refsite": down}
+    self._position: list = []
+    self._grip: list = []
+    for axis, name in enumerate("xyz"):
+      push, turn = np.zeros(6), np.zeros(6)
+      push[axis], turn[3 + axis] = _SIGNS[axis], 1.0
       self._position.append(
-        actuator.add(
+        root.actuator.add(
           "intvelocity",
           name=f"set_point_{name}",
-          site=panda.tcp,
-          refsite=down,
-          gear=gear,
+          gear=push,
           kp=_POSITION_GAINS[axis],
           kv=_POSITION_DAMPINGS[axis],
           actrange=(ws.SET_POINT_LOW[axis], ws.SET_POINT_HIGH[axis]),
-          ctrlrange=(-SPEED, SPEED),
+          ctrlrange=(-ws.SET_POINT_SPEED, ws.SET_POINT_SPEED),
           forcerange=(-_POSITION_FORCE, _POSITION_FORCE),
+          **sites,
         )
       )
-      gear = np.zeros(6)
-      gear[3 + axis] = 1.0
-      self._rotation.append(
-        actuator.add(
-          "position",
-          name=f"upright_{name}",
-          site=panda.tcp,
-          refsite=down,
-          gear=gear,
-          kp=_ROTATION_GAIN,
-          kv=_ROTATION_DAMPING,
-          forcerange=(-_ROTATION_TORQUE, _ROTATION_TORQUE),
-        )
-      )
-    self._grip = [
-      actuator.add(
+      root.actuator.add(
         "position",
-        name=f"grip_{side}",
-        joint=joint,
-        kp=_FINGER_GAIN,
-        kv=_FINGER_DAMPING,
-        ctrlrange=(0.0, FINGER_TRAVEL),
-        forcerange=(-_FINGER_FORCE, _FINGER_FORCE),
+        name=f"upright_{name}",
+        gear=turn,
+        kp=_ROTATION_GAIN,
+        kv=_ROTATION_DAMPING,
+        forcerange=(-_ROTATION_TORQUE, _ROTATION_TORQUE),
+        **sites,
       )
-      for side, joint in zip(
-        ("left", "right"), panda.finger_joints, strict=True
+    for side, joint in zip(("left", "right"), panda.finger_joints, strict=True):
+      self._grip.append(
+        root.actuator.add(
+          "position",
+          name=f"grip_{side}",
+          joint=joint,
+          kp=_FINGER_GAIN,
+          kv=_FINGER_DAMPING,
+          ctrlrange=(0.0, FINGER_TRAVEL),
+          forcerange=(-_FINGER_FORCE, _FINGER_FORCE),
+        )
       )
-    ]
 
   def after_compile(self, physics: mjcf.Physics) -> None:
     """Looks up where the servos' controls and set-points live."""
-    model = physics.model
-    position = physics.bind(self._position).element_id
-    self._speed_ids = np.asarray(position)
-    self._set_point_ids = np.asarray(model.actuator_actadr)[position]
+    position = np.asarray(physics.bind(self._position).element_id)
+    self._speed_ids = position
+    self._set_point_ids = np.asarray(physics.model.actuator_actadr)[position]
     self._grip_ids = np.asarray(physics.bind(self._grip).element_id)
 
   def reset(self, physics: mjcf.Physics, opening: float) -> None:
@@ -111,27 +99,22 @@ class SetPointControl:
 
     Args:
       physics: with the arm already placed and forward kinematics done.
-      opening: the fingers' opening, 0 closed to 1 open; held until the first
-        gripper command.
+      opening: 0 closed to 1 open; held until the first gripper command.
     """
     tcp = physics.bind(self._panda.tcp).xpos
-    low, high = ws.SET_POINT_LOW, ws.SET_POINT_HIGH
-    physics.data.act[self._set_point_ids] = np.clip(tcp, low, high)
+    set_point = np.clip(tcp, ws.SET_POINT_LOW, ws.SET_POINT_HIGH)
+    physics.data.act[self._set_point_ids] = set_point
     physics.data.ctrl[:] = 0.0
     physics.data.ctrl[self._grip_ids] = opening * FINGER_TRAVEL
 
   def apply(self, physics: mjcf.Physics, action: np.ndarray) -> None:
     """Sets the controls of the coming control step from a valid action."""
     ctrl = physics.data.ctrl
-    ctrl[self._speed_ids] = SPEED * action[:3]
+    ctrl[self._speed_ids] = ws.SET_POINT_SPEED * action[:3]
     if action[3] < 0.0:
       ctrl[self._grip_ids] = FINGER_TRAVEL
     elif action[3] > 0.0:
       ctrl[self._grip_ids] = 0.0
-
-  def set_point(self, physics: mjcf.Physics) -> np.ndarray:
-    """The TCP's set-point in the base frame, float [3], m."""
-    return np.array(physics.data.act[self._set_point_ids])
 
 
 def check_action(action) -> np.ndarray:
@@ -146,8 +129,7 @@ def check_action(action) -> np.ndarray:
       f"action has shape {action.shape}; valid is ({ACTION_SIZE},): dx, dy, "
       "dz of the set-point and the gripper, each in [-1, 1]"
     )
-  # A sum is NaN exactly when a term is, or when infinities cancel: both are
-  # faults, and this is the cheapest test for them.
+  # NaN exactly when a term is, or when infinities cancel: the cheapest test.
   if math.isnan(action.sum()):
     raise ValueError(f"action {action} contains NaN; valid values are [-1, 1]")
   return np.clip(action, -1.0, 1.0)

@@ -10,7 +10,7 @@ from dm_control.composer import observation
 from dm_control.rl import control
 
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.initialisers import Start
+from lfgp_dmc.tasks.initialisers import Request
 from lfgp_dmc.tasks.play import PlayTask
 
 
@@ -18,19 +18,17 @@ class _OncePerStepUpdater(observation.Updater):
   """Reads every enabled observable once a control step, without buffers.
 
   Composer's updater keeps a schedule and a buffer for each observable, at
-  every physics step. With the plain observables of this project that is pure
-  overhead; observables with buffers, delays, aggregators or corruptors still
-  go through Composer's way.
+  every physics step: pure overhead unless an observable has a buffer, delay,
+  aggregator or corruptor.
   """
 
   def reset(self, physics, random_state):
     super().reset(physics, random_state)
-    enabled = [o for o in self._observables.values() if o.enabled]
-    self._is_plain = all(_is_plain(o) for o in enabled)
+    enabled = {k: v for k, v in self._observables.items() if v.enabled}
+    self._is_plain = all(map(_is_plain, enabled.values()))
     self._readers = {
       name: value.observation_callable(physics, random_state)
-      for name, value in self._observables.items()
-      if value.enabled
+      for name, value in enabled.items()
     }
 
   def prepare_for_next_control_step(self):
@@ -58,16 +56,15 @@ def _is_plain(value) -> bool:
 
 
 class PlayEnvironment(composer.Environment):
-  """A `composer.Environment` with seeds, chosen starts and physics counters.
+  """A `composer.Environment` with seeds and requested starts.
 
   Attributes:
     physics_failures: episodes that ended in a divergence of the simulation.
-    checks: times that conditions are checked in a control step, every 50 ms.
-    on_check: called after each, so that films at low control rates are smooth.
+    checks: checks of the conditions in a control step, one every 50 ms.
+    on_check: called after each, for smooth films at low control rates.
   """
 
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
-    """Wraps a task; `lfgp_dmc.load` is the way to make one."""
     self._steps = 0
     self._reset_next_step: bool
     self._step_limit = round(time_limit / task.control_timestep)
@@ -98,13 +95,9 @@ class PlayEnvironment(composer.Environment):
     return super().reset()
 
   def reset_to(
-    self,
-    tcp=None,
-    blue=None,
-    green=None,
-    fingers: float | None = None,
+    self, tcp=None, blue=None, green=None, fingers: float | None = None
   ) -> dm_env.TimeStep:
-    """Starts an episode in a chosen state, at rest; None is sampled.
+    """Starts an episode at rest in a requested state; None is sampled.
 
     Args:
       tcp: [3], m, in the robot's base frame.
@@ -113,35 +106,30 @@ class PlayEnvironment(composer.Environment):
       fingers: opening of both, 0 closed to 1 open; held until the first
         gripper command.
 
-    Returns:
-      The first timestep.
-
     Raises:
       ValueError: a wrong shape, a value that is not finite, an opening
         outside [0, 1], or a TCP that the arm cannot reach.
     """
     if fingers is not None and not 0.0 <= fingers <= 1.0:
       raise ValueError(f"fingers={fingers!r}; valid is 0 (closed) to 1 (open)")
-    self._task.request_start(
-      Start(
-        tcp=_checked("tcp", tcp, 3),
-        blue=_checked("blue", blue, 7),
-        green=_checked("green", green, 7),
-        fingers=fingers,
-      )
+    self._task.request = Request(
+      tcp=_checked("tcp", tcp, 3),
+      blue=_checked("blue", blue, 7),
+      green=_checked("green", green, 7),
+      fingers=fingers,
     )
     return self.reset()
 
   def reseed(self, seed: int) -> None:
-    """Makes the next reset, and what follows, depend on `seed` alone."""
+    """Makes the next reset and all that follows depend on `seed` alone."""
     self._random_state.seed(seed)
 
   def clear_success(self) -> None:
-    """Restarts every hold and latch (play-based collection)."""
+    """Restarts every hold and latch, as play-based collection needs."""
     self._task.clear_success()
 
   def step(self, action) -> dm_env.TimeStep:
-    """One control step: all its physics steps at once.
+    """One control step.
 
     Success never ends an episode. The time limit gives LAST with discount 1;
     a divergence of the simulation gives LAST with discount 0, is logged and

@@ -18,7 +18,7 @@ from lfgp_dmc.tasks.snapshot import Snapshot
 
 _WRENCH_SCALE = np.array([100.0] * 3 + [10.0] * 3)  # N, N m
 
-# Bits of the contact table: who a geom belongs to.
+# Bits of the contact table: the owner of a geom.
 _BLUE, _GREEN, _TRAY, _ROBOT = 1, 2, 4, 8
 
 
@@ -43,14 +43,8 @@ class FeatureReader:
     self._finger = address(sensors["left_finger"])
     force = address(sensors["force"])  # and the torque behind it
     self._wrench = slice(force, force + 6)
-    block_parts = (
-      "position",
-      "rotation",
-      "linear_velocity",
-      "angular_velocity",
-    )
     self._blocks = [
-      {name: address(block.sensors[name]) for name in block_parts}
+      {name: address(sensor) for name, sensor in block.sensors.items()}
       for block in (self._blue, self._green)
     ]
     self._rotations = np.array(
@@ -77,9 +71,9 @@ class FeatureReader:
   def _weigh_hand(self, physics) -> None:
     """Weight beyond the wrist and its lever, in the hand's frame."""
     bodies = physics.bind(self._panda.hanging_bodies)
-    self._weight = float(np.sum(bodies.mass)) * -physics.model.opt.gravity[2]
-    self._wrist_id = int(physics.bind(self._panda.wrist).element_id)
     wrist = physics.bind(self._panda.wrist)
+    self._wrist_id = int(wrist.element_id)
+    self._weight = float(np.sum(bodies.mass)) * -physics.model.opt.gravity[2]
     centre = np.average(np.array(bodies.xipos), axis=0, weights=bodies.mass)
     frame = np.array(wrist.xmat).reshape(3, 3)
     self._lever = (frame.T @ (centre - np.array(wrist.xpos))).tolist()
@@ -121,12 +115,12 @@ class FeatureReader:
     return set((pairs[:, 0] | pairs[:, 1]).tolist())
 
   def robot_touches_block(self, physics: mjcf.Physics) -> bool:
-    """Is any block in contact with the robot."""
+    """Whether any block is in contact with the robot."""
     touching = self._touching(physics.data.ptr)
     return bool(touching & {_ROBOT | _BLUE, _ROBOT | _GREEN})
 
   def features(self, physics: mjcf.Physics) -> np.ndarray:
-    """The 59 floats of the contract, float32 [59]; call once a control step."""
+    """The observation, float32 [59]; call once a control step."""
     sensed = physics.data.ptr.sensordata
     out = self._matrix @ sensed
     out += self._offset
@@ -166,7 +160,7 @@ class FeatureReader:
     self._matrix, self._offset = matrix, offset
 
   def _force_torque(self, physics, sensed) -> np.ndarray:
-    """Tanh of what the wrist carries beyond its own hand, float [6]."""
+    """Tanh of the wrist's load apart from the hand, float [6]."""
     frame = physics.data.ptr.site_xmat[self._wrist_id, 6:9].tolist()
     # The sensor reads what holds the hand up: minus the weight, in its frame.
     a, b, c = (self._weight * axis for axis in frame)

@@ -1,14 +1,13 @@
 """A block task as a Gymnasium environment, by way of shimmy.
 
-Observations are the 59 floats that every policy of this project takes, a box
-float32 [59]; with `observations="vision"` a dictionary of what is observed.
-What belongs to tasks is in `info` instead:
+Observations are the flat 59 floats, a box float32 [59]; with
+`observations="vision"` a dictionary. What belongs to tasks is in `info`:
   `is_success`: whether the loaded task has succeeded in this episode;
   `successes`, `conditions`: task -> bool for all nine, see `lfgp_dmc`;
   `physics_failure`: whether the simulation broke; such an episode is truncated.
 
 Episodes are truncated at their time limit and never terminate: success does not
-end them. `reset(seed=...)` makes what follows depend on the seed alone.
+end them. After `reset(seed=...)` everything depends on the seed alone.
 """
 
 from typing import Any
@@ -18,38 +17,24 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics
-from lfgp_dmc.acting.environments import REWARD_PREFIX
-from lfgp_dmc.observations import (
-  CONDITION_PREFIX,
-  OBSERVATION_SIZE,
-  SUCCESS_PREFIX,
-)
+from lfgp_dmc.acting.environments import TASK_PREFIXES
+from lfgp_dmc.observations import OBSERVATION_SIZE
 
 graphics.choose_backend()  # before shimmy imports MuJoCo
 
 from shimmy import DmControlCompatibilityV0  # noqa: E402
 from shimmy.utils.dm_env import dm_spec2gym_space  # noqa: E402
 
-_TASK_PREFIXES = (SUCCESS_PREFIX, CONDITION_PREFIX, REWARD_PREFIX)
 _FIXED_RENDERING = {"height": 480, "width": 640, "camera_id": "three_quarter"}
-
-
-def make(
-  task: str, render_mode: str | None = None, **options: Any
-) -> "BlockEnvironment":
-  """What `gymnasium.make("lfgp_dmc/...")` calls.
-
-  Args:
-    task: one of the nine.
-    render_mode: None, "rgb_array" or "depth_array".
-    **options: of `lfgp_dmc.load`; `render_kwargs` chooses height, width and
-      camera_id of pictures.
-  """
-  return BlockEnvironment(task, render_mode, **options)
 
 
 class BlockEnvironment(DmControlCompatibilityV0):
   """A Composer environment of this project for Gymnasium."""
+
+  metadata = gymnasium.Env.metadata | {
+    "render_modes": ["rgb_array", "depth_array"],
+    "render_fps": 20,
+  }
 
   def __init__(
     self,
@@ -58,26 +43,29 @@ class BlockEnvironment(DmControlCompatibilityV0):
     render_kwargs: dict[str, Any] | None = None,
     **options: Any,
   ):
-    """Builds the environment; see `make`."""
+    """Builds the environment.
+
+    Args:
+      task: one of the nine.
+      render_mode: None, "rgb_array" or "depth_array".
+      render_kwargs: height, width and camera_id of pictures.
+      **options: of `lfgp_dmc.load`.
+    """
     self.task_name, self._is_closed = task, False
-    self.metadata = {
-      "render_modes": ["rgb_array", "depth_array"],
-      "render_fps": options.get("control_hz", 20),
-    }
-    frames_a_second = self.metadata["render_fps"]
+    self.metadata = dict(self.metadata)  # shimmy writes into it
     super().__init__(
       lfgp_dmc.load(task, **options),
       render_mode,
       {**_FIXED_RENDERING, **(render_kwargs or {})},
     )
-    self.metadata["render_fps"] = frames_a_second  # shimmy's is 1000 times dt
+    self.metadata["render_fps"] = options.get("control_hz", 20)
     self._is_flat = options.get("observations", "features") == "features"
     self.observation_space = self._space()
 
   def reset(
     self, *, seed: int | None = None, options: dict[str, Any] | None = None
   ) -> tuple[Any, dict[str, Any]]:
-    """Starts an episode; `options` may name the starts of `reset_to`."""
+    """Starts an episode; `options` are the arguments of `reset_to`."""
     gymnasium.Env.reset(self, seed=seed)
     if seed is not None:
       self._env.reseed(seed)
@@ -122,4 +110,4 @@ class BlockEnvironment(DmControlCompatibilityV0):
 
 
 def _without_tasks(named) -> dict[str, Any]:
-  return {k: v for k, v in named.items() if not k.startswith(_TASK_PREFIXES)}
+  return {k: v for k, v in named.items() if not k.startswith(TASK_PREFIXES)}

@@ -1,6 +1,6 @@
 """Success is a condition held long enough, then latched for the episode."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 
 from lfgp_dmc.tasks.goals import Goal
 
@@ -9,7 +9,6 @@ class Holds:
   """Counts consecutive checks of every task's condition."""
 
   def __init__(self, goals: Mapping[str, Goal]):
-    """Starts with nothing held."""
     self._needed = [goal.hold_checks for goal in goals.values()]
     self.clear()
 
@@ -18,7 +17,7 @@ class Holds:
     self._held = [0] * len(self._needed)
     self.successes = [False] * len(self._needed)
 
-  def check(self, conditions: Sequence[bool]) -> None:
+  def check(self, conditions: Iterable[bool]) -> None:
     """One check, every 50 ms; `conditions` in the order of the goals."""
     for index, holds in enumerate(conditions):
       if not holds:

@@ -2,12 +2,11 @@
 
 `<folder>/<task>.npz` holds `observation` [N, 59], `action` [N, 4] and
 `next_observation` [N, 59]: the last transition of N episodes in their PyBullet
-world, in our layout but for three things that are mended here: quaternions are
+world. Three things differ from our layout and are converted: quaternions are
 x y z w; blocks start upside down, which a cube does not show; floats 47:53
-point to the zones' centres, 1 cm below ours.
+point to the zones' centres, 1 cm below p_s.
 
-They show what success looks like and not how to get there: they serve
-`config.agent.reward_source=examples`.
+Such rows show success but no way to it: they serve examples-only learning.
 """
 
 import pathlib
@@ -35,14 +34,10 @@ def is_folder_of_examples(folder: files.Path) -> bool:
 def read_folder(
   folder: files.Path, tasks: Sequence[str]
 ) -> dict[str, Demonstrations]:
-  """Reads and converts the files of several tasks.
-
-  Args:
-    folder: of `<task>.npz` files.
-    tasks: the tasks whose files are needed.
+  """Reads and converts the files of the tasks.
 
   Returns:
-    Task -> its rows; each is an episode of its own and its success.
+    Task -> its rows, each an episode of its own that ends in success.
 
   Raises:
     DatasetError: one line a faulty or missing file.
@@ -63,12 +58,12 @@ def read_folder(
   return found
 
 
-def convert(observation: np.ndarray) -> np.ndarray:
-  """Published observations, float [N, 59], as ours, float32 [N, 59]."""
+def _convert(observation: np.ndarray) -> np.ndarray:
+  """Published observations, float [N, 59], in our layout, float32 [N, 59]."""
   ours = np.array(observation, np.float32)
   for part in _ROTATIONS:
     quaternions = np.roll(observation[:, part], 1, axis=1)  # w first
-    ours[:, part] = [reduce_rotation(quat) for quat in quaternions]
+    ours[:, part] = reduce_rotation(quaternions)
   ours[:, _HEIGHTS_TO_SLOTS] += _ZONE_TO_SLOT
   return ours
 
@@ -84,9 +79,9 @@ def _read(path: pathlib.Path) -> Demonstrations:
   if not all(np.isfinite(a).all() for a in (observation, action, following)):
     raise ValueError("NaN or infinity among the numbers")
   return Demonstrations(
-    convert(observation),
+    _convert(observation),
     np.clip(action, -1, 1).astype(np.float32),
-    convert(following),
+    _convert(following),
     np.arange(rows, dtype=np.int32),
     np.ones(rows, np.bool_),
     {"task": path.stem, "expert": "published examples"},

@@ -1,4 +1,4 @@
-"""Rotations of a cube that looks the same from 24 sides."""
+"""Rotations of a cube, modulo its 24 symmetries."""
 
 import itertools
 
@@ -8,8 +8,8 @@ import numpy as np
 def _cube_rotations() -> np.ndarray:
   """The cube's 24 rotations as unit quaternions w x y z, float [24, 4].
 
-  They are the 24 units of the binary octahedral group up to sign: the axes,
-  the sums of two axes and the sums of all four, normalised.
+  The binary octahedral group up to sign: the axes of the quaternions, sums of
+  two axes and sums of all four, normalised.
   """
   found: list[tuple[float, ...]] = []
   for count in (1, 2, 4):
@@ -29,15 +29,13 @@ def _right_matrix(quat) -> np.ndarray:
   )
 
 
-# [24, 4, 4]: applied to a quaternion, all equal-looking ones of a cube.
+# [24, 4, 4]: these map a quaternion to all of its equivalents.
 _SYMMETRIES = np.stack([_right_matrix(quat) for quat in _cube_rotations()])
-
-
 _TO_COSINES = np.ascontiguousarray(_SYMMETRIES[:, 0].T)  # [4, 24]
 
 
 def reduce_rotation(quat: np.ndarray) -> np.ndarray:
-  """The equal-looking rotation of a cube with the smallest angle.
+  """The equivalent rotation of a cube with the smallest angle.
 
   Args:
     quat: unit quaternions w x y z, float [..., 4].
@@ -46,7 +44,7 @@ def reduce_rotation(quat: np.ndarray) -> np.ndarray:
     float [..., 4], w > 0; among ties the cube rotation of the lowest index.
   """
   cosines = np.abs(quat @ _TO_COSINES)
-  # Rounded, so that a tie is a tie and not the last bit's toss-up.
+  # Rounded, so that the last bit decides no tie.
   best = _SYMMETRIES[np.argmax(cosines.round(9), axis=-1)]
   reduced = (best @ quat[..., None])[..., 0]
   return np.where(reduced[..., :1] < 0, -reduced, reduced)

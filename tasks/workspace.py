@@ -1,7 +1,7 @@
 """The named numbers of the play world, in the robot's base frame.
 
 +y points away from the robot, z up. Source: the released environment, with
-the slips that design.md's decisions mend. Lengths in m.
+its slips mended (see "Departures" in WORKSPACE.md). Lengths in m.
 """
 
 import math
@@ -30,9 +30,11 @@ GREEN_SLOT = (*GREEN_XY, INSERTED_Z)  # p_s of the paper, for green
 # The TCP's set-point is clipped to this box: 30 x 30 x 14.5 cm.
 SET_POINT_LOW = (-0.15, 0.35, 0.145)
 SET_POINT_HIGH = (0.15, 0.65, 0.29)
+SET_POINT_SPEED = 0.2  # m/s at |a| = 1: 1 cm per 50 ms
 
 # Start states: spawn="published" samples in the central 15 x 15 cm.
 SPAWN_HALF = 0.075
+START_CLEARANCE = 0.0005  # of a block above what it is set on
 TCP_START_Z = (FLOOR_Z + 0.05, FLOOR_Z + 0.145)
 
 BLUE_RGBA = (0.13, 0.34, 0.80, 1.0)

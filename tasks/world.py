@@ -4,7 +4,7 @@ from lfgp_dmc.tasks import contacts
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.arena import PlayArena
 from lfgp_dmc.tasks.control import SetPointControl
-from lfgp_dmc.tasks.entities import Block, Panda, Slot, Tray, Zone
+from lfgp_dmc.tasks.entities import Block, Panda, Tray, Zone
 from lfgp_dmc.tasks.features import FeatureReader
 
 
@@ -30,11 +30,7 @@ class World:
       "blue": Zone(name="blue_zone", xy=ws.BLUE_XY, rgba=ws.BLUE_RGBA),
       "green": Zone(name="green_zone", xy=ws.GREEN_XY, rgba=ws.GREEN_RGBA),
     }
-    slots = (
-      Slot(name="blue_slot", xy=ws.BLUE_XY),
-      Slot(name="green_slot", xy=ws.GREEN_XY),
-    )
-    for entity in (self.panda, self.tray, *self.zones.values(), *slots):
+    for entity in (self.panda, self.tray, *self.zones.values()):
       self.arena.attach(entity)
     self.arena.add_free_entity(self.blue)
     self.arena.add_free_entity(self.green)

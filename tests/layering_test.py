@@ -71,12 +71,22 @@ class LayeringTest(parameterized.TestCase):
     )
     self.assertEqual((eager, lazy), ({"a", "c"}, {"g", "i", "tasks", "agents"}))
 
-  def test_importing_the_facade_loads_neither_simulator_nor_torch(self):
+  @parameterized.parameters(
+    (
+      "lfgp_dmc, lfgp_dmc.runs.loop, lfgp_dmc.acting.evaluation",
+      {"torch", *_SIMULATOR, "lfgp_dmc.tasks", "lfgp_dmc.agents"},
+    ),
+    (
+      "lfgp_dmc.tasks.experts, lfgp_dmc.tasks.mirror,"
+      "lfgp_dmc.tasks.published_examples",
+      {"torch", *_SIMULATOR},
+    ),
+    ("lfgp_dmc.tasks.environment", {"torch"}),
+  )
+  def test_importing_does_not_load(self, modules, heavy):
     code = (
-      "import sys, lfgp_dmc, lfgp_dmc.runs.loop, lfgp_dmc.acting.evaluation\n"
-      "heavy = {'torch', 'mujoco', 'dm_control', 'lfgp_dmc.tasks',"
-      " 'lfgp_dmc.agents'}\n"
-      "found = heavy & set(sys.modules)\n"
+      f"import sys, {modules}\n"
+      f"found = {heavy} & set(sys.modules)\n"
       "sys.exit(str(found) if found else 0)"
     )
     done = subprocess.run(

@@ -18,7 +18,7 @@ from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
-from lfgp_dmc.types import Episode, Metrics, Period
+from lfgp_dmc.types import Episode, Metrics
 
 
 class LfgpAgent:
@@ -186,13 +186,6 @@ class LfgpAgent:
     return self.policy.act(
       observation, self._task, deterministic=False, generator=self._acting
     )
-
-  def next_period(self, env_step: int) -> Period:
-    """Steps the scheduler for an actor elsewhere; see `types.Agent`."""
-    self._choose()
-    self._env_steps = env_step
-    random_steps = max(0, self._config.random_steps - env_step)
-    return Period(self._task, self._config.xi, random_steps)
 
   def _choose(self) -> None:
     index = self._scheduler.next_task()

@@ -23,8 +23,6 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
     actions, resets and `flatten` included. `mj_step_per_s`: control steps'
     worth of `mj_step` alone, on scripted actions, resets apart.
     `mj_step_fraction`: the first over the second. `reset_ms`.
-    `vector_steps_per_s_1`, `_2`, `_4`: of that many environments, each in a
-    process of its own, together.
   """
   environment = lfgp_dmc.load(_TASK, seed=seed)
   played = steps / _random_play(environment, steps, seed)
@@ -37,22 +35,6 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
     environment.reset()
   yield "reset_ms", 1000 * (time.perf_counter() - start) / _RESETS
   environment.close()
-  for count in (1, 2, 4):
-    yield f"vector_steps_per_s_{count}", _side_by_side(count, steps, seed)
-
-
-def _side_by_side(count: int, steps: int, seed: int) -> float:
-  """Control steps a second of `count` environments together."""
-  random = np.random.default_rng(seed)
-  rounds = max(1, steps // count)
-  actions = random.uniform(-1, 1, (rounds, count, 4)).astype(np.float32)
-  with lfgp_dmc.load_vector(_TASK, count, seed) as vector:
-    vector.reset()  # the first one compiles
-    start = time.perf_counter()
-    vector.reset()
-    for action in actions:
-      lfgp_dmc.flatten(vector.step(action).observation)
-    return rounds * count / (time.perf_counter() - start)
 
 
 def _random_play(environment, steps: int, seed: int) -> float:
@@ -76,7 +58,7 @@ def _physics_alone(environment, steps: int, seed: int) -> float:
 
   from lfgp_dmc.tasks import experts
 
-  expert = experts.make_expert()
+  expert = experts.ScriptedExpert()
   model, data = environment.physics.model.ptr, environment.physics.data.ptr
   signature = mujoco.mjtState.mjSTATE_INTEGRATION
   state = np.empty(mujoco.mj_stateSize(model, signature))

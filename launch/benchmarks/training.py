@@ -10,12 +10,11 @@ import torch
 import lfgp_dmc
 from lfgp_dmc import observations
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import policies
 from lfgp_dmc.launch.benchmarks import learner
 from lfgp_dmc.launch.configs import RunConfig
-from lfgp_dmc.remote_acting import RemoteActor
 from lfgp_dmc.runs import loop
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 _ACTION_SIZE = 4
 _EPISODE = 360
@@ -41,8 +40,7 @@ def measure(
   replay = Replay(steps + _EPISODE, observations.OBSERVATION_SIZE, _ACTION_SIZE)
   agent = learner.make_agent(config, replay)
   environment = lfgp_dmc.load(config.main_task, seed=config.seed)
-  remote = _remote_actor(config, agent) if config.actor_process else None
-  train = functools.partial(_train, config, environment, agent, replay, remote)
+  train = functools.partial(_train, config, environment, agent, replay)
   progress = train(_EPISODE, None)
   rates = {}
   for threads in (1, 2):
@@ -66,21 +64,10 @@ def measure(
   yield "learner_updates_per_s", again
   yield "loop_fraction", updates / max(again, rates[threads])
   environment.close()
-  if remote is not None:
-    remote.close()
 
 
-def _remote_actor(config: RunConfig, agent) -> RemoteActor:
-  return RemoteActor(
-    functools.partial(lfgp_dmc.load, config.main_task),
-    functools.partial(policies.sampling_policy, agent.policy_options()),
-  )
-
-
-def _train(
-  config, environment, agent, replay, remote, env_steps, progress
-) -> loop.Progress:
-  schedule = loop.TrainSchedule(
+def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
+  schedule = TrainSchedule(
     env_steps=env_steps,
     log_every=config.log_every,
     warmup_steps=_EPISODE + 1,
@@ -90,13 +77,7 @@ def _train(
   with tempfile.TemporaryDirectory() as folder:
     log = MetricsLog(folder)
     progress = loop.train(
-      environment,
-      agent,
-      replay,
-      schedule,
-      log,
-      progress=progress,
-      remote=remote,
+      environment, agent, replay, schedule, log, progress=progress
     )
     log.close()
   return progress

@@ -5,8 +5,9 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lfgp_dmc.agents import bc, lfgp
-from lfgp_dmc.agents.bc import BcAgent, BcConfig
-from lfgp_dmc.agents.lfgp import LfgpAgent, LfgpConfig
+from lfgp_dmc.agents.bc import BcConfig
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 
 @dataclasses.dataclass(frozen=True)
@@ -15,7 +16,7 @@ class Algorithm:
 
   summary: str
   agent_config: type  # a frozen dataclass with defaults for every field
-  build: Callable[..., LfgpAgent | BcAgent]  # see `agents.lfgp.build`
+  build: Callable[..., ActingAgent | SupervisedAgent]  # see `lfgp.build`
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
   is_multitask: bool = True  # learns all of `task_set`, or the main task alone
   is_supervised: bool = (

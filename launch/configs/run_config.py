@@ -4,7 +4,7 @@ import dataclasses
 from typing import Any
 
 from lfgp_dmc.launch.configs import algorithms
-from lfgp_dmc.launch.environment_spec import World
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
 
@@ -49,7 +49,6 @@ class RunConfig:
   replay_capacity: int = 4_000_000  # transitions
   device: str = "auto"  # cpu, cuda, ...; auto: cuda where there is one
   threads: int = 1  # of torch; 0: one a core that this process may use
-  actor_process: bool = False  # act in another process, while this one learns
   deterministic: bool = False  # the same numbers again, after a resume too
 
   agent: Any = None  # the dataclass of the algorithm's own settings
@@ -96,9 +95,9 @@ class RunConfig:
       raise ValueError("\n".join(faults))
 
   @property
-  def world(self) -> World:
+  def world(self) -> EnvironmentSpec:
     """Where the agent acts."""
-    return World(self.main_task, self.environment, self.control_hz)
+    return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
 
   @property
   def uses_demonstrations(self) -> bool:

@@ -2,9 +2,9 @@
 
 Both follow the paper's section on expert data. Reset-based: a reset before
 each attempt. Play-based: no reset between attempts, the next task drawn
-uniformly from T_all, a reset every 360 steps. Every attempt (play: every
-stretch between resets) depends on the seed and its number alone, and results
-are merged by number, so the data do not depend on the number of workers.
+uniformly from T_all, a reset every 360 steps. Each attempt (play: each stretch
+between resets) depends on the seed and its number alone, so the data are the
+same with any number of workers.
 """
 
 import functools
@@ -16,10 +16,10 @@ import numpy as np
 import tqdm
 
 from lfgp_dmc.acting import workers as work
-from lfgp_dmc.acting.attempts import Attempt, Collector, Job, Plan, Rows
+from lfgp_dmc.acting.attempts import Attempt, CollectionPlan, Collector, Job
+from lfgp_dmc.data.demonstration_checks import COLLECTIONS
 from lfgp_dmc.data.demonstrations import Demonstrations
-
-COLLECTIONS = ("reset", "play")
+from lfgp_dmc.types import Transition
 
 _CHUNK = 8  # reset-based attempts a job
 _MOST_FAILURES = 200  # attempts in a row, after which a task is given up
@@ -34,11 +34,11 @@ class Collected(NamedTuple):
 
 
 class NoSuccessError(RuntimeError):
-  """The expert does not succeed at a task."""
+  """The expert keeps failing at a task."""
 
 
 def collect(
-  plan: Plan,
+  plan: CollectionPlan,
   collection: str,
   tasks: Sequence[str],
   pairs: int,
@@ -64,7 +64,7 @@ def collect(
 
   Raises:
     ValueError: an unknown collection or task.
-    NoSuccessError: a task failed very often in a row.
+    NoSuccessError: 200 attempts at a task failed in a row.
   """
   if collection not in COLLECTIONS:
     raise ValueError(
@@ -88,7 +88,7 @@ def collect(
 
 
 def _fill(
-  plan: Plan,
+  plan: CollectionPlan,
   piles: Mapping[str, "_Pile"],
   units: list[str | None],
   workers: int,
@@ -105,7 +105,7 @@ def _fill(
         bar.set_description(unit)
       while not all(pile.is_full for pile in wanted.values()):
         of_unit, attempts = next(results)
-        if of_unit != unit:  # begun before it was known that it is full
+        if of_unit != unit:  # begun before it was full
           continue
         for attempt in attempts:
           if attempt.task in wanted:
@@ -116,13 +116,13 @@ def _fill(
 
 
 class _OpenUnits:
-  """Jobs without end: numbered chunks of the first unit not yet closed."""
+  """Endless jobs: numbered chunks of the first unit not yet closed."""
 
   def __init__(self, units: list[str | None]):
     self._units = list(units)
 
   def close(self, unit: str | None) -> None:
-    """Ends a unit: no more jobs of it."""
+    """Yields no more jobs of a unit."""
     self._units.remove(unit)
 
   def __iter__(self) -> Iterator[Job]:
@@ -140,20 +140,16 @@ class _Pile:
 
   def __init__(self, task: str, pairs: int, finals: int):
     self._task, self._pairs, self._wanted = task, pairs, pairs + finals
-    self._rows: list[Rows] = []
+    self._rows: list[Transition] = []
     self._stored = self._attempts = self._failures = 0
 
   @property
   def is_full(self) -> bool:
-    """Are there as many pairs as wanted."""
+    """Whether all pairs are there."""
     return self._stored >= self._wanted
 
   def add(self, attempt: Attempt) -> int:
-    """Takes an attempt in, unless full; returns how many pairs it added.
-
-    Raises:
-      NoSuccessError: too many failures in a row.
-    """
+    """Takes an attempt in, unless full; returns how many pairs it added."""
     if self.is_full:
       return 0
     self._attempts += 1
@@ -171,12 +167,12 @@ class _Pile:
       self._rows.append(attempt.rows)
       self._stored = min(before + len(attempt.rows.action), self._pairs)
     else:
-      self._rows.append(Rows(*(part[-1:] for part in attempt.rows)))
+      self._rows.append(Transition(*(part[-1:] for part in attempt.rows)))
       self._stored += 1
     return self._stored - before
 
   def collected(self) -> Collected:
-    """The pairs, the attempt that fills them cut; then the extra finals."""
+    """The pairs, the last attempt cut; then the extra finals."""
     lengths = [len(rows.action) for rows in self._rows]
     is_last = np.zeros(sum(lengths), np.bool_)
     is_last[np.cumsum(lengths) - 1] = True

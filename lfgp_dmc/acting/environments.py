@@ -1,9 +1,8 @@
 """How any dm_env environment is read: flat observations, widths, rewards.
 
-Our nine tasks are laid out in the order of `observations.py`. Every other
-environment gets its floating-point observables end to end, in the order of its
-own specification; what belongs to tasks (`success/`, `condition/`, `reward/`)
-is never part of what a policy sees.
+Our nine tasks are laid out in the order of `observations.py`, every other
+environment's floating-point observables in the order of its specification. What
+belongs to tasks (`success/`, `condition/`, `reward/`) is never an input.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -14,11 +13,10 @@ import numpy as np
 
 from lfgp_dmc import observations
 
-REWARD_PREFIX = "reward/"
-_TASK_PREFIXES = (
+TASK_PREFIXES = (
   observations.SUCCESS_PREFIX,
   observations.CONDITION_PREFIX,
-  REWARD_PREFIX,
+  observations.REWARD_PREFIX,
 )
 
 Flattener = Callable[[Any], np.ndarray]
@@ -38,7 +36,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   names = [
     name
     for name, part in spec.items()
-    if not name.startswith(_TASK_PREFIXES)
+    if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
   if not names:
@@ -52,6 +50,22 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     return np.concatenate(parts, dtype=np.float32)
 
   return flatten
+
+
+def reseeded(
+  environment: dm_env.Environment,
+  make_environment: Callable[..., dm_env.Environment],
+  seed: int,
+) -> dm_env.Environment:
+  """The environment whose next reset depends on `seed` alone.
+
+  It is the same one if it has a `reseed`, or else a new one of `seed=`.
+  """
+  if hasattr(environment, "reseed"):
+    environment.reseed(seed)
+    return environment
+  environment.close()
+  return make_environment(seed=seed)
 
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
@@ -76,37 +90,38 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
     tasks: K names.
 
   Returns:
-    float32 [K]: the observable `reward/<task>`, or where the environment does
-    not show it, the environment's own reward.
+    float32 [K]: the observable `reward/<task>`, or without one the
+    environment's own reward.
   """
   own = 0.0 if timestep.reward is None else float(timestep.reward)
   shown = timestep.observation
   if not isinstance(shown, Mapping):
     shown = {}
-  rewards = [float(shown.get(REWARD_PREFIX + task, own)) for task in tasks]
+  rewards = [
+    float(shown.get(observations.REWARD_PREFIX + task, own)) for task in tasks
+  ]
   return np.asarray(rewards, np.float32)
 
 
 def tasks_with_rewards(
   environment: dm_env.Environment, tasks: Sequence[str]
 ) -> tuple[str, ...]:
-  """All tasks whose reward the environment shows, or else `tasks`.
+  """`tasks`, then all others whose reward is an observable.
 
-  A replay that keeps the rewards of all of them can be carried over to any
-  of these tasks without a simulator.
+  A replay that keeps all of these can be transferred to any of the tasks.
   """
   spec = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
   shown = [
-    name.removeprefix(REWARD_PREFIX)
+    name.removeprefix(observations.REWARD_PREFIX)
     for name in names
-    if name.startswith(REWARD_PREFIX)
+    if name.startswith(observations.REWARD_PREFIX)
   ]
   return (*tasks, *(task for task in shown if task not in tasks))
 
 
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:
-  """Whether `task` has succeeded; None if the environment cannot tell."""
+  """Whether `task` has succeeded; None if it is not observable."""
   shown = timestep.observation
   if not isinstance(shown, Mapping):
     return None

@@ -1,43 +1,22 @@
 """Evaluation: fixed seeded episodes of every intention, one row an episode.
 
-Episode i starts from a reset that depends on (seed, i) alone: not on the task,
-the method, the episodes before it, or how many processes share the work.
+The reset of episode i depends on (seed, i) alone: not on the task, the method,
+the episodes before it, or the number of processes.
 """
 
 import contextlib
 import functools
-import inspect
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import dm_env
 import tqdm
 from absl import logging
 
 from lfgp_dmc import seeding
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.acting import workers as work
-from lfgp_dmc.data.evaluation_csv import (
-  EvaluationRow,
-  append_csv,
-  mean_returns,
-  read_csv,
-  success_rates,
-  success_table,
-  write_csv,
-)
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.types import Actor
-
-__all__ = [
-  "EvaluationRow",
-  "append_csv",
-  "evaluate",
-  "mean_returns",
-  "read_csv",
-  "success_rates",
-  "success_table",
-  "write_csv",
-]
 
 
 def evaluate(
@@ -53,11 +32,9 @@ def evaluate(
   """Plays `episodes` whole episodes of each task in one environment.
 
   Args:
-    make_environment: builds the main task's environment, with the observables
-      `reward/<task>` switched on where it has them. One without `reseed` is
-      built anew each episode with `seed=` if the factory takes that.
-    make_actor: builds the actor. With several workers both must be importable:
-      module-level functions, or `functools.partial` of them.
+    make_environment: builds the main task's environment, which observes
+      `reward/<task>` if it can; see `environments.reseeded`.
+    make_actor: builds the actor. With several workers both must be picklable.
     tasks: the intentions to evaluate.
     episodes: episodes a task.
     seed: the evaluation's own seed.
@@ -87,26 +64,28 @@ def evaluate(
 
 
 class _Player:
-  """An environment and an actor, built once and used for many episodes."""
+  """An environment and an actor for many episodes."""
 
   def __init__(self, make_environment, make_actor, seed: int, env_step: int):
     self._make_environment = make_environment
     self._seed = seed
     self._env_step = env_step
     self._environment = make_environment()
-    self._flatten = environments.flattener(self._environment)
     self._actor: Actor = make_actor()
 
   def __call__(self, job: tuple[str, int]) -> EvaluationRow:
     """Plays one whole episode; success never ends it."""
     task, episode = job
-    self._prepare(seeding.derive(self._seed, "evaluation", episode))
+    self._environment = environments.reseeded(
+      self._environment,
+      self._make_environment,
+      seeding.derive(self._seed, "evaluation", episode),
+    )
     self._actor.begin(task, seeding.derive(self._seed, "actor", task, episode))
     timestep = self._environment.reset()
     steps, total, first = 0, 0.0, None
-    while not timestep.last():
-      action = self._actor.act(self._flatten(timestep.observation))
-      timestep = self._environment.step(action)
+    for step in rollout.steps(self._environment, timestep, self._actor.act):
+      timestep = step.timestep
       steps += 1
       total += float(environments.task_rewards(timestep, (task,))[0])
       if first is None and environments.has_succeeded(timestep, task):
@@ -129,17 +108,3 @@ class _Player:
   def close(self) -> None:
     """Frees the environment."""
     self._environment.close()
-
-  def _prepare(self, seed: int) -> None:
-    if hasattr(self._environment, "reseed"):
-      self._environment.reseed(seed)
-    elif _takes_seed(self._make_environment):
-      self._environment.close()
-      self._environment = self._make_environment(seed=seed)
-
-
-def _takes_seed(factory: Callable[..., Any]) -> bool:
-  try:
-    return "seed" in inspect.signature(factory).parameters
-  except (TypeError, ValueError):  # a builtin without a signature
-    return False

@@ -1,8 +1,4 @@
-"""Work shared among processes, with results in the order of the jobs.
-
-Each process builds its own state once (an environment, an actor). Jobs may be
-endless: a few are in flight, and closing the iterator ends the processes.
-"""
+"""Work shared among processes, with results in the order of the jobs."""
 
 import collections
 import concurrent.futures
@@ -15,7 +11,7 @@ import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from typing import Any
 
-# What a worker must find set before it imports anything.
+# Set before a worker imports anything.
 _VARIABLES = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
@@ -30,17 +26,15 @@ def ordered(
   jobs: Iterable[Any],
   workers: int,
 ) -> Generator[Any, None, None]:
-  """Yields the result of each job, in order.
+  """Yields `make_state()(job)` for each job, in order.
 
   Args:
-    make_state: called once in each process; returns what does a job, and may
-      have a `close`. With several workers it must be picklable, and so must
-      jobs and results.
-    jobs: finite or endless.
+    make_state: called once in each process, such as for an environment; its
+      result does the jobs, and may have a `close`. With several workers it must
+      be picklable, and so must jobs and results.
+    jobs: finite or endless: a few are in flight, and closing the generator
+      ends the processes.
     workers: processes; 1 works in this one.
-
-  Yields:
-    `make_state()(job)` for each job.
   """
   if workers == 1:
     state = make_state()
@@ -51,7 +45,7 @@ def ordered(
         state.close()
     return
   jobs = iter(jobs)
-  with variables():
+  with _variables():
     pool = concurrent.futures.ProcessPoolExecutor(
       workers,
       mp_context=multiprocessing.get_context("spawn"),
@@ -77,7 +71,7 @@ _state: Callable[[Any], Any] | None = None  # one in each worker process
 
 def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
   global _state
-  settle_in()
+  init_worker()
   _state = make_state()
 
 
@@ -86,12 +80,8 @@ def _work(job: Any) -> Any:
   return _state(job)
 
 
-def settle_in() -> None:
-  """What each process of ours does first.
-
-  Ctrl-C, which goes to every process, is left to the parent; and when that is
-  gone, however it was killed, the process ends.
-  """
+def init_worker() -> None:
+  """Initialises a worker: ignores SIGINT, exits with its parent."""
   signal.signal(signal.SIGINT, signal.SIG_IGN)
   threading.Thread(target=_end_with_parent, daemon=True).start()
 
@@ -104,11 +94,11 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def variables() -> Iterator[None]:
+def _variables() -> Iterator[None]:
   """Sets the variables that spawned processes inherit, then restores ours.
 
-  They must be there before a worker's first import, which an initializer
-  would come too late for: unpickling its arguments already imports.
+  A worker's initializer would set them too late: unpickling its arguments
+  imports.
   """
   before = {name: os.environ.get(name) for name in _VARIABLES}
   os.environ.update(_VARIABLES)

@@ -18,7 +18,7 @@ def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
   """
   with open(path, newline="", encoding="utf-8") as file:
     text = file.read()
-  # A process killed while writing leaves a last line without its end.
+  # A process that is killed while writing leaves a torn last line.
   whole = text[: text.rfind("\n") + 1]
   reader = csv.DictReader(whole.splitlines())
   columns = list(reader.fieldnames or ())

@@ -1,8 +1,4 @@
-"""What can be wrong with one file of demonstrations, in words.
-
-Each check takes what was read and returns the faults it finds; none raises. A
-fault says what is there and what would be valid.
-"""
+"""Checks of one file of demonstrations: each returns its faults, in words."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -40,8 +36,8 @@ def of_arrays(
 
   Args:
     arrays: name -> array, as read.
-    observation_size: O the environment asks for; None accepts any.
-    action_size: A the environment asks for; None accepts any.
+    observation_size: O of the environment; None accepts any.
+    action_size: A of the environment; None accepts any.
 
   Returns:
     One phrase a fault; empty if there is none.

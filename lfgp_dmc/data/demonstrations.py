@@ -1,4 +1,4 @@
-"""Demonstrations: one HDF5 file a task, checked whole before it is used.
+"""Demonstrations: one HDF5 file a task, checked before use.
 
 `<dataset>/<task>.hdf5` holds `observation` float32 [N, O], `action` float32
 [N, A], `next_observation` float32 [N, O], `episode` int32 [N] (which attempt a
@@ -28,7 +28,7 @@ class DatasetError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Demonstrations:
-  """N pairs of one task, in the order in which they were shown."""
+  """N pairs of one task, in the order of demonstration."""
 
   observation: np.ndarray  # float32 [N, O]
   action: np.ndarray  # float32 [N, A], in [-1, 1]

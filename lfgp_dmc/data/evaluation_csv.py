@@ -1,7 +1,4 @@
-"""`evaluation.csv`, its rows, and the table of success that people read.
-
-Users reach all of it through `evaluation.py`.
-"""
+"""`evaluation.csv`, its rows, and the table of success."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -28,14 +25,9 @@ class EvaluationRow(NamedTuple):
   task: str
   episode: int
   seed: int
-  success: int | None  # 0 or 1; None: the environment cannot tell
+  success: int | None  # 0 or 1; None: not observable
   steps_to_success: int | None  # control steps until the first success
   episode_return: float  # column `return`: undiscounted reward of that task
-
-
-def write_csv(path: files.Path, rows: Iterable[EvaluationRow]) -> None:
-  """Writes a whole file, replacing what was there."""
-  csv_files.write(path, COLUMNS, [_as_text(row) for row in rows])
 
 
 def append_csv(path: files.Path, rows: Iterable[EvaluationRow]) -> None:
@@ -61,7 +53,7 @@ def read_csv(path: files.Path) -> list[EvaluationRow]:
 
 
 def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
-  """Task -> share of its episodes that succeeded; NaN if it cannot be told."""
+  """Task -> share of successful episodes; NaN if they cannot be observed."""
   rates = {}
   for task in dict.fromkeys(row.task for row in rows):
     known = [

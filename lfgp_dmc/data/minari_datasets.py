@@ -1,10 +1,9 @@
 """Demonstrations to and from Minari; needs the extra `minari`.
 
 Minari keeps whole trajectories: T + 1 observations of T actions, rewards and
-ends. A demonstration has no rewards, so they are 0 there; one that ends in
-success is `terminated` at its last step, every other `truncated`. The way back
-reads both as that, and takes anybody's dataset of flat float observations.
-Datasets lie where Minari keeps them (`MINARI_DATASETS_PATH`).
+ends. Demonstrations have no rewards: they are 0 there. A trajectory that ends
+in success is `terminated`, any other `truncated`, and is read back so. Any
+local dataset of flat float observations can be read (`MINARI_DATASETS_PATH`).
 """
 
 import json

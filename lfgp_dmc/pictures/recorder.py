@@ -1,12 +1,13 @@
 """Plays one episode and makes frames of it, with what is going on on top."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 
 import dm_env
 import numpy as np
 
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.pictures import video
 from lfgp_dmc.types import Actor
 
@@ -63,26 +64,21 @@ def record(
     The clip.
   """
   prepare(environment, look)
-  recorder = _Recorder(environment, look)
-  flatten = environments.flattener(environment)
-  clip, timestep, tail = recorder.clip, first, 0
+  recorder = _Recorder(environment, actor, first, choose, seed, look)
+  clip, tail = recorder.clip, 0
+  played = rollout.steps(environment, first, recorder.act)
   try:
-    while True:
-      wanted = choose(clip.steps, timestep)
-      if wanted != recorder.task:
-        recorder.task = wanted
-        actor.begin(wanted, seed + clip.steps)
-      recorder.begin_step(timestep)
-      if timestep.last() or clip.steps == max_steps:
-        return clip
-      timestep = environment.step(actor.act(flatten(timestep.observation)))
+    for step in itertools.islice(played, max_steps):
+      recorder.timestep = step.timestep
       clip.steps += 1
-      for name in set(_successes(timestep)) - set(clip.first_success):
+      for name in set(_successes(step.timestep)) - set(clip.first_success):
         clip.first_success[name] = clip.steps
       if until_success_of in clip.first_success:
         tail += clip.checks
         if tail > _TAIL:
           return clip
+    recorder.begin_step()
+    return clip
   finally:
     recorder.close()
 
@@ -90,18 +86,30 @@ def record(
 class _Recorder:
   """Takes the frames, between control steps too where there is more to see."""
 
-  def __init__(self, environment: dm_env.Environment, look: Look):
+  def __init__(self, environment, actor, first, choose, seed: int, look: Look):
     checks = getattr(environment, "checks", 1)
     self.clip = Clip([], [], {}, 0, checks)
-    self.task = ""
+    self.timestep: dm_env.TimeStep = first
+    self._task = ""
     self._environment, self._look = environment, look
+    self._actor, self._choose, self._seed = actor, choose, seed
     if checks > 1:
-      environment.on_check = self._on_check  # type: ignore[attr-defined]
+      environment.on_check = self._on_check
 
-  def begin_step(self, timestep: dm_env.TimeStep) -> None:
-    """Takes the frame of a control step's beginning, if it is due."""
-    self._timestep, self._check = timestep, 0
-    self._take(is_last=timestep.last())
+  def act(self, observation: np.ndarray) -> np.ndarray:
+    """The action of the task whose turn it is."""
+    self.begin_step()
+    return self._actor.act(observation)
+
+  def begin_step(self) -> None:
+    """Begins the task whose turn it is; takes the frame if it is due."""
+    clip = self.clip
+    wanted = self._choose(clip.steps, self.timestep)
+    if wanted != self._task:
+      self._task = wanted
+      self._actor.begin(wanted, self._seed + clip.steps)
+    self._check = 0
+    self._take(is_last=self.timestep.last())
 
   def close(self) -> None:
     """Lets go of the environment."""
@@ -118,9 +126,9 @@ class _Recorder:
     now = clip.steps * clip.checks + self._check
     if look.every and (now % look.every == 0 or is_last):
       clip.frames.append(
-        _frame(self._environment, self._timestep, self.task, clip, look)
+        _frame(self._environment, self.timestep, self._task, clip, look)
       )
-      clip.labels.append(self.task)
+      clip.labels.append(self._task)
 
 
 _TAIL = 20  # 50 ms checks shown after a success

@@ -44,7 +44,7 @@ def save(
   Args:
     folder: the run's `checkpoints/`; made if missing.
     env_step: environment steps so far; names the checkpoint.
-    state: nested dicts and lists of arrays and JSON values (see `nested.py`).
+    state: nested dicts and lists of arrays and JSON values (see `pytree.py`).
     run_steps: length of the whole run; None keeps the last three only.
 
   Returns:
@@ -74,7 +74,7 @@ def save(
 
 
 def load(path: files.Path) -> dict[str, Any]:
-  """Reads one checkpoint back, verified; see `save` for what it returns.
+  """Reads the state that `save` wrote, verified.
 
   Raises:
     CheckpointError: a file of it is missing, truncated or altered.
@@ -139,18 +139,14 @@ def _verify(path: pathlib.Path) -> None:
   try:
     manifest = files.read_json(path / _MANIFEST)
     for name in (_ARRAYS, _STATE):
-      found = _fingerprint(path / name)
-      if found != manifest[name]:
-        raise CheckpointError(
+      found, written = _fingerprint(path / name), manifest[name]
+      if found != written:
+        raise ValueError(
           f"{path / name} has {found['bytes']} bytes that are not the "
-          f"{manifest[name]['bytes']} that were written"
+          f"{written['bytes']} that were written"
         )
-  except (OSError, KeyError, TypeError) as error:
+  except (OSError, KeyError, TypeError, ValueError) as error:
     raise CheckpointError(f"{path}: {error}") from None
-  except CheckpointError:
-    raise
-  except ValueError as error:
-    raise CheckpointError(str(error)) from None
 
 
 def _thin_out(folder: pathlib.Path, run_steps: int | None) -> None:

@@ -1,4 +1,4 @@
-"""The metrics of one run: `metrics.csv` with TensorBoard events beside it."""
+"""The metrics of one run: `metrics.csv`, and TensorBoard events beside it."""
 
 import csv
 import pathlib
@@ -31,11 +31,6 @@ class MetricsLog:
       str(self._path.parent / _EVENTS_FOLDER)
     )
 
-  @property
-  def columns(self) -> tuple[str, ...]:
-    """The columns, in order; empty before the first row."""
-    return tuple(self._columns)
-
   def write(self, row: Mapping[str, float]) -> None:
     """Appends one row and flushes it.
 
@@ -62,7 +57,7 @@ class MetricsLog:
     self.write_scalars(int(row[csv_files.STEP_COLUMN]), row)
 
   def write_scalars(self, env_step: int, values: Mapping[str, float]) -> None:
-    """Sends values to TensorBoard alone (evaluation has its own CSV)."""
+    """Sends values to TensorBoard alone."""
     summary = summary_pb2.Summary(
       value=[
         summary_pb2.Summary.Value(tag=name, simple_value=float(value))
@@ -76,7 +71,7 @@ class MetricsLog:
     self._events.flush()
 
   def truncate_after(self, env_step: int) -> None:
-    """Drops what was logged after `env_step`, where a resumed run goes on."""
+    """Drops rows and events after `env_step`, where a resumed run goes on."""
     csv_files.truncate_after(self._path, env_step)
     # TensorBoard hides older events from the step of a START event on.
     start = event_pb2.SessionLog(status=event_pb2.SessionLog.START)

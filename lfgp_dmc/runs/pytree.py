@@ -1,8 +1,7 @@
 """Nested state <-> flat arrays and a JSON tree.
 
-A learner's state is dicts and lists whose leaves are NumPy arrays or JSON
-values. Arrays go to one flat dict under names like `critic/optimizer/0`; in the
-tree their place is kept by `{"__array__": name}`. Tuples come back as lists.
+Arrays go to one flat dict under names like `critic/optimizer/0`; in the tree
+`{"__array__": name}` keeps their place. Tuples come back as lists.
 """
 
 from collections.abc import Mapping

@@ -1,7 +1,6 @@
 """A run's folder: `config.json`, CSVs, `checkpoints/`, `replay/`.
 
-A folder belongs to one process at a time: it holds a lock on `run.lock`, which
-the system releases however the process ends.
+It belongs to one process at a time, by a lock on `run.lock`.
 """
 
 import dataclasses
@@ -15,13 +14,14 @@ from typing import Any
 from lfgp_dmc.data import files
 
 CONFIG_NAME = "config.json"
-# What the run itself adds to the config that it was started with: the policy's
-# widths and tasks, so that a run's folder is a policy folder too.
-ADDED_FIELDS = ("policy",)
+ARRAYS_NAME = "policy.safetensors"
+# Added to the config by the run: the options of the policy's arrays, so that
+# its folder is a policy folder too.
+POLICY_FIELD = "policy"
 
 
 class RunFolderError(ValueError):
-  """A run folder that cannot be used as asked; the message says why."""
+  """A run folder that cannot be used so; the message says why."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -40,11 +40,6 @@ class RunFolder:
   def evaluation(self) -> pathlib.Path:
     """A row an evaluation episode, CSV."""
     return self.path / "evaluation.csv"
-
-  @property
-  def metrics(self) -> pathlib.Path:
-    """A row a log interval, CSV."""
-    return self.path / "metrics.csv"
 
   @property
   def checkpoints(self) -> pathlib.Path:
@@ -113,16 +108,19 @@ def resume(
       the fields), or another process is running it.
   """
   path = pathlib.Path(path)
-  known = read_config(path)
-  known = complete({k: v for k, v in known.items() if k not in ADDED_FIELDS})
-  asked = {k: v for k, v in config.items() if k not in ADDED_FIELDS}
-  fields = differing_fields(known, asked)
+  known = complete(settings(read_config(path)))
+  fields = _differing_fields(known, settings(config))
   if fields:
     raise RunFolderError(
       f"{path} was started with another config; --resume keeps it. Differing: "
       + "; ".join(fields)
     )
   return RunFolder(path, _locked(path))
+
+
+def settings(config: Mapping[str, Any]) -> dict[str, Any]:
+  """What a run was started with: its config without what it added."""
+  return {k: v for k, v in config.items() if k != POLICY_FIELD}
 
 
 def read_config(path: files.Path) -> dict[str, Any]:
@@ -145,7 +143,7 @@ def read_config(path: files.Path) -> dict[str, Any]:
   return config
 
 
-def differing_fields(
+def _differing_fields(
   known: Mapping[str, Any], asked: Mapping[str, Any]
 ) -> list[str]:
   """What differs between two configs: `agent.xi (45, now 90)`, ..."""
@@ -170,7 +168,7 @@ def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def _locked(path: pathlib.Path):
-  """An open file whose lock keeps other processes off the folder."""
+  """An open file whose lock the system releases however the process ends."""
   file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
   try:
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

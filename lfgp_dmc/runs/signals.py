@@ -1,4 +1,4 @@
-"""A polite stop: the first signal asks, the second interrupts."""
+"""A polite stop: the first signal requests it, the second interrupts."""
 
 import contextlib
 import signal
@@ -11,25 +11,25 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopRequest:
-  """Whether somebody asked the process to finish."""
+  """Whether a stop is requested."""
 
   def __init__(self):
-    self._asked = False
+    self._is_made = False
 
   def __bool__(self) -> bool:
-    return self._asked
+    return self._is_made
 
-  def ask(self) -> None:
-    """Asks to finish at the next good moment."""
-    self._asked = True
+  def make(self) -> None:
+    """Requests a stop at the next good moment."""
+    self._is_made = True
 
 
 @contextlib.contextmanager
 def stop_request() -> Iterator[StopRequest]:
   """Turns SIGINT and SIGTERM into a request while the block runs.
 
-  A second signal raises KeyboardInterrupt. Outside the main thread, where
-  Python cannot handle signals, the request is only ever made by `ask`.
+  A second signal raises KeyboardInterrupt. Python handles signals in the main
+  thread alone: elsewhere nothing makes the request.
   """
   request = StopRequest()
   if threading.current_thread() is not threading.main_thread():
@@ -44,7 +44,7 @@ def stop_request() -> Iterator[StopRequest]:
       "%s: finishing this episode, then a checkpoint; once more to stop now",
       signal.Signals(number).name,
     )
-    request.ask()
+    request.make()
 
   before = {number: signal.signal(number, handle) for number in _SIGNALS}
   try:

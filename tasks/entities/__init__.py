@@ -2,8 +2,7 @@
 
 from lfgp_dmc.tasks.entities.block import Block
 from lfgp_dmc.tasks.entities.panda import Panda
-from lfgp_dmc.tasks.entities.slot import Slot
 from lfgp_dmc.tasks.entities.tray import Tray
 from lfgp_dmc.tasks.entities.zone import Zone
 
-__all__ = ["Block", "Panda", "Slot", "Tray", "Zone"]
+__all__ = ["Block", "Panda", "Tray", "Zone"]

@@ -3,14 +3,13 @@
 import pathlib
 
 import rtbdata
-from dm_control import composer, mjcf
-from dm_control.composer.observation import observable
 
 from lfgp_dmc.tasks.entities import panda_links as links
+from lfgp_dmc.tasks.entities.body import Body
 
 _MESHES = pathlib.Path(rtbdata.__file__).parent / "meshes/FRANKA-EMIKA/Panda"
-_WHITE = (0.93, 0.93, 0.94, 1.0)
-_DARK = (0.22, 0.23, 0.25, 1.0)
+_WHITE = {"rgba": (0.93, 0.93, 0.94, 1.0), "specular": 0.4, "shininess": 0.5}
+_DARK = {"rgba": (0.22, 0.23, 0.25, 1.0), "specular": 0.3, "shininess": 0.3}
 
 _JOINT_DAMPING = 0.3  # N m s/rad
 # Reflected rotor inertia, kg m^2; large enough for explicit damping.
@@ -18,6 +17,7 @@ _JOINT_ARMATURES = (0.15, 0.15, 0.15, 0.3, 0.3, 0.4, 0.3)
 _NULL_SPACE_STIFFNESS = 0.5  # N m/rad, pulls the elbow home
 _FINGER_ARMATURE = 0.2  # kg
 _FINGER_COUPLING = (0.01, 1.0)  # solref: s, damping ratio
+_FINGER_INERTIA = (4e-5, 4e-5, 1e-5)  # kg m^2, diagonal
 
 # Pads: full size 17 x 10 x 18.4 mm, inner face in the plane where the fingers
 # meet, end 7 mm past the TCP; the finger's thicker body above them.
@@ -28,64 +28,62 @@ _BODY_POS = (0.0, 0.0145, 0.0175)  # m
 _HAND_HALF = (0.03, 0.1, 0.033)  # m
 _HAND_POS = (0.0, 0.0, 0.033)  # m
 
-_NO_CONTACT = {"contype": 0, "conaffinity": 0}
 
+class Panda(Body):
+  """The arm and hand, without the servos of `tasks/control.py`.
 
-class Panda(composer.Entity):
-  """The arm and hand; how it is driven is `tasks/control.py`'s business."""
+  Attributes:
+    joints: the arm's seven, from the base.
+    finger_joints: the slides of the left (+y of the hand) and right finger.
+    tcp: the tool centre point, a site between the pads.
+    wrist: the site of the force-torque sensor.
+    sensors: sensor elements by quantity; positions in the world frame.
+    hanging_bodies: what hangs beyond the wrist sensor: hand and fingers.
+    pads_and_fingers: the boxes of both fingers.
+    hand_geom: the box around the palm.
+    collision_geoms: every primitive: arm capsules, palm, fingers.
+  """
 
   def _build(self, name: str = "panda") -> None:
-    self._mjcf_model = mjcf.RootElement(model=name)
-    asset = self._mjcf_model.asset
-    self._materials = {
-      "white": asset.add(
-        "material", name="white", rgba=_WHITE, specular=0.4, shininess=0.5
-      ),
-      "dark": asset.add(
-        "material", name="dark", rgba=_DARK, specular=0.3, shininess=0.3
-      ),
-    }
-    self._joints: list = []
-    self._collision_geoms: list = []
-    flange = self._add_arm()
-    self._hand = self._add_hand(flange)
-    self._fingers = [
-      self._add_finger("left", (1.0, 0.0, 0.0, 0.0)),
-      self._add_finger("right", (0.0, 0.0, 0.0, 1.0)),
-    ]
-    self._finger_joints = [finger.joint[0] for finger in self._fingers]
-    self._mjcf_model.equality.add(
+    root = self._start_model(name)
+    self._white = root.asset.add("material", name="white", **_WHITE)
+    self._dark = root.asset.add("material", name="dark", **_DARK)
+    self.joints: list = []
+    self.collision_geoms: list = []
+    hand = self._add_hand(self._add_arm())
+    left = self._add_finger(hand, "left", (1.0, 0.0, 0.0, 0.0))
+    right = self._add_finger(hand, "right", (0.0, 0.0, 0.0, 1.0))
+    self.hanging_bodies = [hand, left, right]
+    self.pads_and_fingers = self.collision_geoms[-4:]
+    self.finger_joints = [left.joint[0], right.joint[0]]
+    root.equality.add(
       "joint",
       name="finger_coupling",
-      joint1=self._finger_joints[0],
-      joint2=self._finger_joints[1],
+      joint1=self.finger_joints[0],
+      joint2=self.finger_joints[1],
       solref=_FINGER_COUPLING,
     )
-    self._add_sites_and_sensors()
+    self._add_sites_and_sensors(hand)
 
-  def _add_mesh(self, body, name: str, material: str, **options) -> None:
-    mesh = self._mjcf_model.find("mesh", name)
-    if mesh is None:
-      mesh = self._mjcf_model.asset.add(
-        "mesh", name=name, file=str(_MESHES / f"{name}.stl")
-      )
-    body.add(
-      "geom",
-      type="mesh",
-      mesh=mesh,
-      material=self._materials[material],
-      group=2,
-      mass=0,
-      **_NO_CONTACT,
-      **options,
+  def _add_body(self, parent, name: str, pos, quat):
+    return parent.add("body", name=name, pos=pos, quat=quat, gravcomp=1)
+
+  def _add_mesh(self, body, name: str, material) -> None:
+    root = self.mjcf_model
+    mesh = root.find("mesh", name) or root.asset.add(
+      "mesh", name=name, file=str(_MESHES / f"{name}.stl")
     )
+    body.add("geom", type="mesh", mesh=mesh, material=material, group=2, mass=0)
+
+  def _add_shape(self, body, **options):
+    geom = body.add("geom", group=3, mass=0, **options)
+    self.collision_geoms.append(geom)
+    return geom
 
   def _add_arm(self):
-    body = self._mjcf_model.worldbody
+    body = self.mjcf_model.worldbody
     for link in links.ARM_LINKS:
-      body = body.add(
-        "body", name=link.name, pos=link.pos, quat=link.quat, gravcomp=1
-      )
+      body = self._add_body(body, link.name, link.pos, link.quat)
       body.add(
         "inertial",
         pos=link.centre_of_mass,
@@ -93,205 +91,80 @@ class Panda(composer.Entity):
         fullinertia=link.inertia,
       )
       if link.joint_range is not None:
-        index = len(self._joints)
-        self._joints.append(
-          body.add(
-            "joint",
-            name=f"joint{index + 1}",
-            axis=(0, 0, 1),
-            range=link.joint_range,
-            limited=True,
-            damping=_JOINT_DAMPING,
-            armature=_JOINT_ARMATURES[index],
-            stiffness=_NULL_SPACE_STIFFNESS,
-            springref=links.HOME[index],
-          )
+        index = len(self.joints)
+        joint = body.add(
+          "joint",
+          name=f"joint{index + 1}",
+          axis=(0, 0, 1),
+          range=link.joint_range,
+          limited=True,
+          damping=_JOINT_DAMPING,
+          armature=_JOINT_ARMATURES[index],
+          stiffness=_NULL_SPACE_STIFFNESS,
+          springref=links.HOME[index],
         )
-      self._add_mesh(body, link.name, "white")
+        self.joints.append(joint)
+      self._add_mesh(body, link.name, self._white)
       for start, end, radius in link.capsules:
-        self._collision_geoms.append(
-          body.add(
-            "geom",
-            type="capsule",
-            fromto=(*start, *end),
-            size=(radius,),
-            group=3,
-            **_NO_CONTACT,
-          )
+        self._add_shape(
+          body, type="capsule", fromto=(*start, *end), size=(radius,)
         )
     return body
 
-  def _add_box(self, body, name, pos, half):
-    geom = body.add(
-      "geom",
-      name=name,
-      type="box",
-      pos=pos,
-      size=half,
-      group=3,
-      mass=0,
-      **_NO_CONTACT,
-    )
-    self._collision_geoms.append(geom)
-    return geom
-
   def _add_hand(self, flange):
-    hand = flange.add(
-      "body",
-      name="hand",
-      pos=links.HAND_POS,
-      quat=links.HAND_QUAT,
-      gravcomp=1,
-    )
+    hand = self._add_body(flange, "hand", links.HAND_POS, links.HAND_QUAT)
     hand.add(
       "inertial",
       pos=links.HAND_CENTRE_OF_MASS,
       mass=links.HAND_MASS,
       diaginertia=links.HAND_INERTIA,
     )
-    self._add_mesh(hand, "hand", "white")
-    self._hand_geom = self._add_box(hand, "hand", _HAND_POS, _HAND_HALF)
+    self._add_mesh(hand, "hand", self._white)
+    self.hand_geom = self._add_shape(
+      hand, name="hand", type="box", pos=_HAND_POS, size=_HAND_HALF
+    )
     return hand
 
-  def _add_finger(self, side: str, quat):
-    finger = self._hand.add(
-      "body",
-      name=f"{side}_finger",
-      pos=(0, 0, links.FINGER_Z),
-      quat=quat,
-      gravcomp=1,
-    )
-    half_y = _PAD_HALF[1]
+  def _add_finger(self, hand, side: str, quat):
+    name = f"{side}_finger"
+    finger = self._add_body(hand, name, (0, 0, links.FINGER_Z), quat)
     finger.add(
       "inertial",
-      pos=(0, half_y, 0.03),
+      pos=(0, _PAD_HALF[1], 0.03),
       mass=links.FINGER_MASS,
-      diaginertia=(4e-5, 4e-5, 1e-5),
+      diaginertia=_FINGER_INERTIA,
     )
     finger.add(
       "joint",
-      name=f"{side}_finger",
+      name=name,
       type="slide",
       axis=(0, 1, 0),
       range=(0, links.FINGER_TRAVEL),
       limited=True,
       armature=_FINGER_ARMATURE,
     )
-    self._add_mesh(finger, "finger", "dark")
-    self._add_box(finger, f"{side}_pad", _PAD_POS, _PAD_HALF)
-    self._add_box(finger, f"{side}_finger", _BODY_POS, _BODY_HALF)
+    self._add_mesh(finger, "finger", self._dark)
+    for part, pos, half in (
+      (f"{side}_pad", _PAD_POS, _PAD_HALF),
+      (name, _BODY_POS, _BODY_HALF),
+    ):
+      self._add_shape(finger, name=part, type="box", pos=pos, size=half)
     return finger
 
-  def _add_sites_and_sensors(self) -> None:
+  def _add_sites_and_sensors(self, hand) -> None:
     site = {"type": "sphere", "size": (0.002,), "group": 4}
-    self._tcp = self._hand.add(
-      "site", name="tcp", pos=(0, 0, links.TCP_Z), **site
-    )
-    self._wrist = self._hand.add("site", name="wrist", **site)
-    sensor = self._mjcf_model.sensor
-    tcp = {"objtype": "site", "objname": self._tcp}
-    left, right = self._finger_joints
-    self._sensors = {
-      "tcp_position": sensor.add("framepos", name="tcp_position", **tcp),
-      "tcp_velocity": sensor.add("framelinvel", name="tcp_velocity", **tcp),
-      "left_finger": sensor.add("jointpos", name="left_finger", joint=left),
-      "right_finger": sensor.add("jointpos", name="right_finger", joint=right),
-      "force": sensor.add("force", name="force", site=self._wrist),
-      "torque": sensor.add("torque", name="torque", site=self._wrist),
+    self.tcp = hand.add("site", name="tcp", pos=(0, 0, links.TCP_Z), **site)
+    self.wrist = hand.add("site", name="wrist", **site)
+    tcp = {"objtype": "site", "objname": self.tcp}
+    left, right = self.finger_joints
+    self.sensors = {
+      name: self.mjcf_model.sensor.add(kind, name=name, **target)
+      for name, kind, target in (
+        ("tcp_position", "framepos", tcp),
+        ("tcp_velocity", "framelinvel", tcp),
+        ("left_finger", "jointpos", {"joint": left}),
+        ("right_finger", "jointpos", {"joint": right}),
+        ("force", "force", {"site": self.wrist}),
+        ("torque", "torque", {"site": self.wrist}),
+      )
     }
-
-  def _build_observables(self) -> "PandaObservables":
-    return PandaObservables(self)
-
-  @property
-  def mjcf_model(self) -> mjcf.RootElement:
-    """The robot's own MJCF tree."""
-    return self._mjcf_model
-
-  @property
-  def joints(self) -> list:
-    """The arm's seven joints, from the base."""
-    return self._joints
-
-  @property
-  def finger_joints(self) -> list:
-    """Left (+y of the hand) and right finger's slides."""
-    return self._finger_joints
-
-  @property
-  def tcp(self):
-    """The tool centre point, a site between the pads."""
-    return self._tcp
-
-  @property
-  def wrist(self):
-    """The site of the force-torque sensor."""
-    return self._wrist
-
-  @property
-  def sensors(self):
-    """Sensor elements by quantity; positions in the world frame."""
-    return self._sensors
-
-  @property
-  def hanging_bodies(self) -> list:
-    """What hangs beyond the wrist sensor: hand and fingers."""
-    return [self._hand, *self._fingers]
-
-  @property
-  def pads_and_fingers(self) -> list:
-    """The boxes of both fingers."""
-    return [
-      geom
-      for finger in self._fingers
-      for geom in finger.geom
-      if geom.type == "box"
-    ]
-
-  @property
-  def hand_geom(self):
-    """The box around the palm."""
-    return self._hand_geom
-
-  @property
-  def collision_geoms(self) -> list:
-    """Every primitive: arm capsules, palm, fingers."""
-    return self._collision_geoms
-
-
-class PandaObservables(composer.Observables):
-  """What the robot's own sensors read."""
-
-  @composer.observable
-  def joint_positions(self):
-    """The arm's joint angles, float [7], rad."""
-    return observable.MJCFFeature("qpos", self._entity.joints)
-
-  @composer.observable
-  def joint_velocities(self):
-    """The arm's joint velocities, float [7], rad/s."""
-    return observable.MJCFFeature("qvel", self._entity.joints)
-
-  @composer.observable
-  def tcp_position(self):
-    """Tool centre point in the base frame, float [3], m."""
-    return observable.MJCFFeature(
-      "sensordata", self._entity.sensors["tcp_position"]
-    )
-
-  @composer.observable
-  def tcp_velocity(self):
-    """Tool centre point's velocity, float [3], m/s."""
-    return observable.MJCFFeature(
-      "sensordata", self._entity.sensors["tcp_velocity"]
-    )
-
-  @composer.observable
-  def wrist_force(self):
-    """Raw wrist force in the hand's frame, float [3], N."""
-    return observable.MJCFFeature("sensordata", self._entity.sensors["force"])
-
-  @composer.observable
-  def wrist_torque(self):
-    """Raw wrist torque in the hand's frame, float [3], N m."""
-    return observable.MJCFFeature("sensordata", self._entity.sensors["torque"])

@@ -2,56 +2,53 @@
 
 import math
 
-from dm_control import composer, mjcf
-
 from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.entities.body import Body
 
 _BASE_HALF = 0.002  # m, half thickness of the slab under the pockets
 _WALL_HALF = 0.004  # m, half thickness of a sloped wall
 _RGBA = (0.80, 0.79, 0.76, 1.0)
 
 
-class Tray(composer.Entity):
-  """A fixed tray of boxes; contacts are declared by the task, pair by pair."""
+class Tray(Body):
+  """A fixed tray of boxes.
+
+  Attributes:
+    wall_geoms: the four sloped walls.
+    geoms: everything that a block can touch.
+  """
 
   def _build(self, name: str = "tray") -> None:
-    self._mjcf_model = mjcf.RootElement(model=name)
-    self._material = self._mjcf_model.asset.add(
+    root = self._start_model(name)
+    self._material = root.asset.add(
       "material", name="plastic", rgba=_RGBA, specular=0.1, shininess=0.1
     )
-    self._floor_geoms = [self._add_base()]
-    self._floor_geoms += [self._add_floor(box) for box in _floor_boxes()]
-    self._wall_geoms = [self._add_wall(index) for index in range(4)]
+    floor = [self._add_base(), *map(self._add_floor, _floor_boxes())]
+    self.wall_geoms = [self._add_wall(index) for index in range(4)]
+    self.geoms = floor + self.wall_geoms
     for index in range(4):
       self._add_visual_wall(index)
 
   def _add_box(self, name, pos, size, **options):
-    return self._mjcf_model.worldbody.add(
+    return self.mjcf_model.worldbody.add(
       "geom",
       name=name,
       type="box",
       pos=pos,
       size=size,
       material=self._material,
-      contype=0,
-      conaffinity=0,
       **options,
     )
 
   def _add_base(self):
     top = ws.FLOOR_Z - ws.SLOT_DEPTH
-    x, y = ws.CENTRE_XY
     size = (ws.FLOOR_HALF, ws.FLOOR_HALF, _BASE_HALF)
-    return self._add_box("base", (x, y, top - _BASE_HALF), size)
+    return self._add_box("base", (*ws.CENTRE_XY, top - _BASE_HALF), size)
 
   def _add_floor(self, box):
     name, (low_x, high_x), (low_y, high_y) = box
     half_z = ws.SLOT_DEPTH / 2
-    pos = (
-      (low_x + high_x) / 2,
-      (low_y + high_y) / 2,
-      ws.FLOOR_Z - half_z,
-    )
+    pos = ((low_x + high_x) / 2, (low_y + high_y) / 2, ws.FLOOR_Z - half_z)
     size = ((high_x - low_x) / 2, (high_y - low_y) / 2, half_z)
     return self._add_box(name, pos, size)
 
@@ -80,74 +77,40 @@ class Tray(composer.Entity):
     """A mitred prism for the eye, where the collision boxes overlap."""
     inner, outer = ws.FLOOR_HALF, ws.TRAY_HALF
     low = ws.FLOOR_Z - ws.SLOT_DEPTH - 2 * _BASE_HALF
-    corners = []
-    for side in (-1.0, 1.0):
-      corners += [
-        (inner, side * inner, ws.FLOOR_Z),
-        (outer, side * outer, ws.RIM_Z),
-        (outer, side * outer, low),
-        (inner, side * inner, low),
-      ]
     turn = index * math.pi / 2
     cos, sin = math.cos(turn), math.sin(turn)
     centre_x, centre_y = ws.CENTRE_XY
-    mesh = self._mjcf_model.asset.add(
-      "mesh",
-      name=f"wall_{index}",
-      vertex=[
-        value
-        for x, y, z in corners
-        for value in (
-          centre_x + x * cos - y * sin,
-          centre_y + x * sin + y * cos,
-          z,
-        )
-      ],
-    )
-    self._mjcf_model.worldbody.add(
+    vertices: list[float] = []
+    for side in (-1.0, 1.0):
+      for x, z in (
+        (inner, ws.FLOOR_Z),
+        (outer, ws.RIM_Z),
+        (outer, low),
+        (inner, low),
+      ):
+        y = side * x
+        vertices += (centre_x + x * cos - y * sin, centre_y + x * sin + y * cos)
+        vertices.append(z)
+    root = self.mjcf_model
+    root.worldbody.add(
       "geom",
       type="mesh",
-      mesh=mesh,
+      mesh=root.asset.add("mesh", name=f"wall_{index}", vertex=vertices),
       material=self._material,
-      contype=0,
-      conaffinity=0,
       mass=0,
     )
-
-  @property
-  def mjcf_model(self) -> mjcf.RootElement:
-    """The tray's own MJCF tree."""
-    return self._mjcf_model
-
-  @property
-  def floor_geoms(self) -> list:
-    """The floor's geoms and the slab under the pockets."""
-    return self._floor_geoms
-
-  @property
-  def wall_geoms(self) -> list:
-    """The four sloped walls."""
-    return self._wall_geoms
-
-  @property
-  def geoms(self) -> list:
-    """Everything a block can touch."""
-    return self._floor_geoms + self._wall_geoms
 
 
 def _floor_boxes():
   """Boxes (name, x range, y range) that tile the floor around two pockets."""
-  low_x, high_x = -ws.FLOOR_HALF, ws.FLOOR_HALF
   low_y = ws.CENTRE_XY[1] - ws.FLOOR_HALF
   high_y = ws.CENTRE_XY[1] + ws.FLOOR_HALF
-  boxes = []
-  edge = low_x
+  edge = -ws.FLOOR_HALF
   for name, (x, y) in (("green", ws.GREEN_XY), ("blue", ws.BLUE_XY)):
     left, right = x - ws.SLOT_HALF, x + ws.SLOT_HALF
     near, far = y - ws.SLOT_HALF, y + ws.SLOT_HALF
-    boxes.append((f"floor_left_of_{name}", (edge, left), (low_y, high_y)))
-    boxes.append((f"floor_near_{name}", (left, right), (low_y, near)))
-    boxes.append((f"floor_far_{name}", (left, right), (far, high_y)))
+    yield f"floor_left_of_{name}", (edge, left), (low_y, high_y)
+    yield f"floor_near_{name}", (left, right), (low_y, near)
+    yield f"floor_far_{name}", (left, right), (far, high_y)
     edge = right
-  boxes.append(("floor_right", (edge, high_x), (low_y, high_y)))
-  return boxes
+  yield "floor_right", (edge, ws.FLOOR_HALF), (low_y, high_y)

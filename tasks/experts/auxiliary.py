@@ -17,7 +17,7 @@ _LIFT_Z = 0.272  # m, of the TCP
 _ORBIT = (0.0, 0.5, 0.235)  # m, centre of Move-Object's circle
 _ORBIT_RADIUS = 0.06  # m
 _ORBIT_SPEED = 0.62
-_RESTLESS = 5.0  # the gripper tasks hover more loosely than a grasp moves
+_RESTLESS = 5.0  # noise factor of the gripper tasks, which need no precision
 
 
 def open_gripper(view: View) -> Command:
@@ -54,32 +54,33 @@ def _hover(view: View) -> motion.Vector:
 
 def reach(view: View) -> Command:
   """Puts the open fingers around blue."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
+  if freeing := place.free_blue(view):
     return freeing
   if is_held(view, view.blue):
     return Command(motion.stay(view), CLOSE)
   return grasp.reach(view, view.blue, height=0.003)
 
 
+def _take_blue(view: View) -> Command | None:
+  """Frees and grasps blue; None: it is in hand."""
+  freeing = place.free_blue(view)
+  if freeing or is_held(view, view.blue):
+    return freeing
+  return grasp.grasp(view, view.blue)
+
+
 def lift(view: View) -> Command:
   """Grasps blue and takes it up."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
-    return freeing
-  if not is_held(view, view.blue):
-    return grasp.grasp(view, view.blue)
+  if taking := _take_blue(view):
+    return taking
   goal = (view.tcp[0], view.tcp[1], _LIFT_Z)
   return Command(motion.servo(view, goal), CLOSE)
 
 
 def move_object(view: View) -> Command:
   """Grasps blue and carries it round a circle over the tray."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
-    return freeing
-  if not is_held(view, view.blue):
-    return grasp.grasp(view, view.blue)
+  if taking := _take_blue(view):
+    return taking
   x, y = view.tcp[0] - _ORBIT[0], view.tcp[1] - _ORBIT[1]
   radius = max(math.hypot(x, y), 1e-6)
   # Along the circle, corrected towards it; up while it is low.

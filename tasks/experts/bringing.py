@@ -7,10 +7,10 @@ from lfgp_dmc.tasks.experts import grasp, motion, place
 from lfgp_dmc.tasks.experts.motion import CLOSE, OPEN, Command
 from lfgp_dmc.tasks.experts.view import BlockView, View, across, is_held
 
-_BROUGHT = 0.026  # m, horizontally, of a block that may stay
-_DODGE = 0.019  # m, the farthest that Bring sets blue down beside the slot
-_IN_MOUTH_Z = ws.INSERTED_Z + 0.0045  # m, of an upright block that will drop
-_IN_SLOT_Z = ws.INSERTED_Z + 0.003  # m, of any block that will drop in
+_BROUGHT = 0.026  # m, horizontal error of a block that may stay
+_DODGE = 0.019  # m, largest shift of blue beside the slot in Bring
+_IN_MOUTH_Z = ws.INSERTED_Z + 0.0045  # m, an upright block below it drops in
+_IN_SLOT_Z = ws.INSERTED_Z + 0.003  # m, any block below it drops in
 _SEATED_Z = ws.INSERTED_Z + 0.002  # m
 _TILTED = math.radians(3.0)
 _JAMMED = math.radians(3.8)
@@ -18,17 +18,13 @@ _TOPPLED = math.radians(7.0)
 _LEAST_GRIP = 0.002  # m, TCP over the centre of a block gripped for the slot
 _ASKEW_ON_FLOOR = math.radians(1.4)
 _ASKEW_IN_AIR = math.radians(4.0)
-_PARK_X, _PARK_Y = (
-  0.04,
-  0.07,
-)  # m from the middle, on the side that green is not
+_PARK_X, _PARK_Y = 0.04, 0.07  # m from the middle, on green's other side
 _PRESS_HEIGHT = 0.024  # m, of closed fingertips' TCP over a block's centre
 
 
 def bring(view: View) -> Command:
   """Sets blue down in its zone and lets go."""
-  freeing = place.free_blue(view, place.CLEAR_OF_ZONES)
-  if freeing is not None:
+  if freeing := place.free_blue(view, place.CLEAR_OF_ZONES):
     return freeing
   blue = view.blue
   spot = _free_spot(view)
@@ -51,8 +47,7 @@ def bring(view: View) -> Command:
 
 def insert(view: View) -> Command:
   """Squares blue, sets it into its slot and lets go."""
-  freeing = place.free_blue(view, place.CLEAR_OF_ZONES)
-  if freeing is not None:
+  if freeing := place.free_blue(view, place.CLEAR_OF_ZONES):
     return freeing
   blue = view.blue
   away = math.hypot(blue.x - ws.BLUE_XY[0], blue.y - ws.BLUE_XY[1])
@@ -105,7 +100,7 @@ def _press(view: View) -> Command:
 
 
 def _is_in_the_way(green: BlockView) -> bool:
-  """Does green lie on blue's slot, or where the fingers come down there."""
+  """Whether green is on blue's slot, or where the fingers come down there."""
   dx = abs(green.x - ws.BLUE_XY[0]) - green.half
   dy = abs(green.y - ws.BLUE_XY[1]) - green.half
   return (dx < 0.023 and dy < 0.023) or (dx < 0.013 and dy < 0.066)

@@ -9,8 +9,7 @@ from lfgp_dmc.tasks.experts import auxiliary, bringing, stacking
 from lfgp_dmc.tasks.experts.motion import Command
 from lfgp_dmc.tasks.experts.view import View, look
 
-NOISE = 0.1  # standard deviation of the action noise, in units of the action
-
+_NOISE = 0.1  # std of the action noise, in units of the action
 _NOISY_FROM = 0.4  # |a| from which the noise is in full
 _LEAST_NOISE = 0.25  # share of the noise at rest
 _MOST_NOISE = 1.5  # of all factors together
@@ -33,17 +32,17 @@ class ScriptedExpert:
   """An `lfgp_dmc.types.Actor` that can do all nine tasks.
 
   Its mean action is a function of the current observation alone. Noise is
-  Gaussian, smaller where the motion is slow; the gripper's magnitude is drawn
-  anew each step, so that no value of it gives the expert away.
+  Gaussian and smaller in slow motion; the gripper's magnitude is drawn anew at
+  each step, so that no value of it gives the expert away.
   """
 
   tasks = ALL_TASKS
 
-  def __init__(self, noise: float = NOISE, control_hz: int = 20):
+  def __init__(self, noise: float = _NOISE, control_hz: int = 20):
     """Makes the actor.
 
     Args:
-      noise: standard deviation of the action noise; 0 is without.
+      noise: std of the Gaussian action noise.
       control_hz: control steps a second of the environment.
 
     Raises:

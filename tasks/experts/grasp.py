@@ -1,4 +1,4 @@
-"""Getting hold of a block: room for the fingers, alignment, closing.
+"""Grasping a block: room for the fingers, alignment, closing.
 
 The fingers close along y and leave a gap of 8 cm when open.
 """
@@ -21,27 +21,20 @@ HOVER = 0.050  # m, TCP above the centre of the highest block on the way
 _FINGER_INSIDE = 0.040  # m, inner face of an open finger, from the TCP
 _FINGER_OUTSIDE = 0.065  # m, outer face of an open finger's thick part
 _FINGER_HALF = 0.0115  # m, half width of a finger along x, with a margin
-_MOST_X = 0.009  # m, a block can be gripped this far off the pads' middle
+_MOST_X = 0.009  # m, largest offset of a gripped block from the pads' middle
+_MOST_Y = 0.010  # m, likewise between the fingers
 _SWEPT = 0.10  # m from the middle along y, where a sweep outwards ends
 _SWEPT_BACK = 0.06  # m likewise, where a sweep inwards ends
-_AT_FINGER = 0.012  # m, TCP beside a block that is at one finger
+_AT_FINGER = 0.012  # m, TCP to a block at one finger
 _ASKEW = math.radians(1.4)
-_OPENING = 0.02  # change of the opening in a step of fingers that open
+_OPENING = 0.02  # change of the opening in a step while fingers open
 
 
-def room(
-  view: View, target: BlockView, most_y: float
-) -> tuple[float, float] | None:
-  """How far to grip beside the target's centre, so that the fingers fit.
-
-  Args:
-    view: the observation.
-    target: the block to get between the fingers.
-    most_y: largest offset along y, m.
+def _room(view: View, target: BlockView) -> tuple[float, float] | None:
+  """Offset of the grip from the target's centre at which the fingers fit.
 
   Returns:
-    The TCP's offset from the block along x and y, m; None: the other block
-    leaves no room.
+    Along x and y, m; None if the other block leaves no room.
   """
   other = view.other(target)
   if abs(other.z - target.z) > 0.030:
@@ -52,38 +45,28 @@ def room(
   over_y = _FINGER_OUTSIDE + other.half - abs(dy)
   if over_x <= 0 or over_y <= 0:
     return (0.0, 0.0)
-  most_y = min(most_y, _FINGER_INSIDE - target.half - 0.003)
-  if over_y <= most_y and over_y <= over_x:
-    return (0.0, -side_y * over_y)
-  if over_x <= _MOST_X:
+  fits_x = over_x <= _MOST_X
+  fits_y = over_y <= min(_MOST_Y, _FINGER_INSIDE - target.half - 0.003)
+  if fits_x and not (fits_y and over_y <= over_x):
     return (-side_x * over_x, 0.0)
-  if over_y <= most_y:
-    return (0.0, -side_y * over_y)
-  return None
+  return (0.0, -side_y * over_y) if fits_y else None
 
 
 def hover_height(view: View) -> float:
-  """Height of the TCP from which it may cross the blocks, m."""
+  """Height at which the TCP may cross the blocks, m."""
   return max(view.blue.z, view.green.z) + HOVER
 
 
 def reach(
-  view: View,
-  target: BlockView,
-  height: float = GRIP_HEIGHT,
-  most_y: float = 0.010,
+  view: View, target: BlockView, height: float = GRIP_HEIGHT
 ) -> Command:
   """Brings the open fingers around a block, pushing it free if need be."""
-  offset = room(view, target, most_y)
+  offset = _room(view, target)
   if is_between_fingers(view, target) and view.opening > 0.7:
     offset = offset or (0.0, 0.0)
   elif offset is None:
-    return push_free(view, target)
-  goal = (
-    target.x + offset[0],
-    target.y + offset[1],
-    max(target.z + height, ws.SET_POINT_LOW[2]),
-  )
+    return _push_free(view, target)
+  goal = (target.x + offset[0], target.y + offset[1], _low(target, height))
   if is_between_fingers(view, target):
     return Command(motion.servo(view, goal), OPEN, noise=0.6)
   # Closed fingers wait above until they are open.
@@ -95,11 +78,8 @@ def reach(
 def grasp(view: View, target: BlockView, square: bool = False) -> Command:
   """Reaches a block and closes the fingers on it.
 
-  Args:
-    view: the observation.
-    target: the block.
-    square: whether to turn it parallel to the fingers first: closing alone
-      aligns a block to 10 degrees, and not at all beyond 35.
+  `square` turns it parallel to the fingers first: closing alone aligns a block
+  to 10 degrees, and not at all beyond 35.
   """
   square = square and target.tilt < 0.1
   is_letting_go = view.opening_rate > _OPENING
@@ -108,42 +88,37 @@ def grasp(view: View, target: BlockView, square: bool = False) -> Command:
     if side and view.opening > 0.92:
       return _sweep(view, target, side)
     if _is_centred(view, target):
-      goal = (
-        target.x,
-        target.y,
-        max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
-      )
+      goal = (target.x, target.y, _low(target))
       return Command(motion.servo(view, goal, gain=0.2), CLOSE, noise=0.5)
   return reach(view, target)
 
 
+def _low(target: BlockView, height: float = GRIP_HEIGHT) -> float:
+  """The TCP's height so far above a block's centre, within the box, m."""
+  return max(target.z + height, ws.SET_POINT_LOW[2])
+
+
 def _is_centred(view: View, target: BlockView) -> bool:
   """In the middle of the gap; less strictly once the fingers are closing."""
-  dx, dy, dz = across(view, target)
   if view.opening < 0.92:
     return True
-  offset = room(view, target, 0.010) or (0.0, 0.0)
-  return (
-    abs(dx - offset[0]) < 0.006 and abs(dy - offset[1]) < 0.006 and dz < 0.015
-  )
+  dx, dy, dz = across(view, target)
+  x, y = _room(view, target) or (0.0, 0.0)
+  return abs(dx - x) < 0.006 and abs(dy - y) < 0.006 and dz < 0.015
 
 
 def _sweep(view: View, target: BlockView, side: float) -> Command:
   """Pushes a block along y with one open finger, whose face squares it."""
-  goal = (
-    target.x,
-    view.set_point[1] + 0.02 * side,
-    max(target.z + GRIP_HEIGHT, ws.SET_POINT_LOW[2]),
-  )
+  goal = (target.x, view.set_point[1] + 0.02 * side, _low(target))
   return Command(motion.servo(view, goal, speed=0.75), OPEN, noise=0.6)
 
 
 def _sweeping_side(view: View, target: BlockView) -> float:
-  """Which way along y to sweep a block; 0: it is where sweeps end.
+  """Direction along y of a sweep; 0 where sweeps end.
 
-  Where the block is decides, as that is easier to see, and to imitate, than
-  a degree of yaw: outwards until it is 10 cm from the middle. Only a block
-  that is askew even there is swept back in, to be swept out again.
+  The block's place decides, which is easier to observe and to imitate than a
+  degree of yaw: outwards until it is 10 cm from the middle. Only a block that
+  is askew even there is swept back in, to be swept out again.
   """
   off_middle = target.y - ws.CENTRE_XY[1]
   outwards = math.copysign(1.0, off_middle)
@@ -155,14 +130,14 @@ def _sweeping_side(view: View, target: BlockView) -> float:
   return outwards
 
 
-def push_free(view: View, target: BlockView) -> Command:
+def _push_free(view: View, target: BlockView) -> Command:
   """Pushes a block along x with closed fingers, away from its neighbour."""
   other = view.other(target)
   side = 1.0 if target.x > other.x else -1.0
   if abs(other.x) > 0.07:  # towards the middle, not up the wall
     side = -math.copysign(1.0, other.x)
   dx, dy, dz = across(view, target)
-  low = max(target.z + 0.004, ws.SET_POINT_LOW[2])
+  low = _low(target, 0.004)
   behind = -side * (target.half + 0.022)
   if dz < 0.022 and abs(dy) < 0.012 and side * dx < -0.018:
     goal = (view.set_point[0] + side * 0.03, target.y, low)

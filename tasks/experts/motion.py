@@ -3,29 +3,23 @@
 import math
 from typing import NamedTuple
 
+from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.experts.view import Vector, View
 
 OPEN, CLOSE = -1, 1
-SPEED = 0.95  # |a| on a long way; 0.2 m/s at 1
 
-_FASTEST = 0.2  # m/s of the set-point at |a| = 1
-_GAIN = 0.4  # share of the remaining way that 50 ms aim to cover
-_GAIN_HZ = 20  # the rate that this is said for
+_SPEED = 0.95  # |a| on a long way
+_GAIN = 0.4  # share of the remaining way to cover in one step of 50 ms
+_GAIN_HZ = 20  # the control rate of such steps
 _TOP = 0.285  # m, highest set-point
 
 
 class Command(NamedTuple):
-  """What an expert wants, before noise.
+  """An expert's decision, before noise."""
 
-  Attributes:
-    move: dx, dy, dz of the action.
-    grip: OPEN or CLOSE.
-    noise: factor on the action noise: below 1 where precision is needed.
-  """
-
-  move: Vector
-  grip: int
-  noise: float = 1.0
+  move: Vector  # dx, dy, dz of the action
+  grip: int  # OPEN or CLOSE
+  noise: float = 1.0  # factor on the action noise: below 1 for precision
 
 
 def clip(value: float, low: float, high: float) -> float:
@@ -34,7 +28,7 @@ def clip(value: float, low: float, high: float) -> float:
 
 
 def servo(
-  view: View, goal: Vector, speed: float = SPEED, gain: float = _GAIN
+  view: View, goal: Vector, speed: float = _SPEED, gain: float = _GAIN
 ) -> Vector:
   """Moves the set-point straight to a goal, slowing down softly.
 
@@ -42,14 +36,14 @@ def servo(
     view: the observation.
     goal: of the TCP, m.
     speed: largest |a|.
-    gain: share of the remaining way that 50 ms cover near the goal.
+    gain: share of the remaining way to cover in 50 ms, near the goal.
 
   Returns:
-    The action's first three values, |a| at most `speed`.
+    The action's first three values.
   """
   share = 1.0 - (1.0 - gain) ** (_GAIN_HZ / view.control_hz)
   wanted = [
-    share / _FASTEST * view.control_hz * (to - at)
+    share / ws.SET_POINT_SPEED * view.control_hz * (to - at)
     for to, at in zip(goal, view.set_point, strict=True)
   ]
   size = math.hypot(*wanted)
@@ -66,7 +60,6 @@ def from_above(
   hover: float,
   narrow: float = 0.006,
   slope: float = 2.5,
-  speed: float = SPEED,
   gain: float = _GAIN,
 ) -> Vector:
   """Servoes to a goal through a funnel: high when far, down when aligned.
@@ -77,7 +70,6 @@ def from_above(
     hover: height of the TCP on the way, m.
     narrow: horizontal error at which the funnel ends, m.
     slope: metres of height for a metre of horizontal error.
-    speed: largest |a|.
     gain: as in `servo`.
 
   Returns:
@@ -97,7 +89,7 @@ def from_above(
     view.set_point[1] + freedom * (y - view.set_point[1]),
     height,
   )
-  return servo(view, to, speed, gain)
+  return servo(view, to, gain=gain)
 
 
 def stay(view: View) -> Vector:

@@ -1,4 +1,4 @@
-"""What to do with a block in hand: carry it, set it down, leave it."""
+"""Handling a held block: carrying, setting down, leaving."""
 
 import math
 
@@ -18,22 +18,17 @@ _CARRY = 0.054  # m, a carried block's centre above the other's
 _ASIDE = 0.09  # m from blue along x, where green is set aside
 CLEAR_OF_SLOTS = 0.05  # m from the middle along y
 CLEAR_OF_ZONES = 0.10  # m likewise, with the fingers' room beside a zone
-_LEAVE = 0.065  # m, TCP above a block that was let go
+_LEAVE = 0.065  # m, TCP above a released block
 
 
 def carry(
-  view: View,
-  block: BlockView,
-  spot: Vector,
-  narrow: float = 0.006,
-  slope: float = 2.5,
-  gain: float = 0.4,
+  view: View, block: BlockView, spot: Vector, **funnel: float
 ) -> Vector:
-  """Moves a held block's centre to `spot`, from above; the action's dx..dz."""
+  """Moves a held block's centre to `spot`; `funnel`: see `from_above`."""
   dx, dy, dz = across(view, block)
   goal = (spot[0] + dx, spot[1] + dy, spot[2] + dz)
   hover = max(view.other(block).z + _CARRY, spot[2] + 0.02) + dz
-  return motion.from_above(view, goal, hover, narrow, slope, gain=gain)
+  return motion.from_above(view, goal, hover, **funnel)
 
 
 def set_down(
@@ -47,7 +42,7 @@ def set_down(
 
 
 def leave(view: View, block: BlockView) -> Command:
-  """Opens the fingers and rises from a block that is where it should be."""
+  """Opens the fingers and rises from a block that is in place."""
   free = motion.clip((view.opening - 0.6) / 0.3, 0.0, 1.0)
   goal = (view.tcp[0], view.tcp[1], block.z + _LEAVE)
   x, y, z = motion.servo(view, goal, speed=0.7)

@@ -12,8 +12,7 @@ _ALIGNED = 0.006  # m
 
 def stack(view: View) -> Command:
   """Takes green off blue if it is there, then puts blue on green."""
-  freeing = place.free_blue(view)
-  if freeing is not None:
+  if freeing := place.free_blue(view):
     return freeing
   blue, green = view.blue, view.green
   if is_held(view, blue):

@@ -1,4 +1,4 @@
-"""What a scripted expert sees: the 59 floats, by name, and nothing else."""
+"""A scripted expert's view of the 59 floats, by name."""
 
 import math
 from dataclasses import dataclass
@@ -15,19 +15,13 @@ _GRIP = (0.40, 0.80)
 
 @dataclass(slots=True)
 class BlockView:
-  """A block; lengths in m, angles in rad.
+  """A block; lengths in m, angles in rad."""
 
-  Attributes:
-    x, y, z: its centre.
-    yaw: turn about z away from the axes, within +-45 degrees.
-    tilt: angle between its most upright side and the vertical.
-  """
-
-  x: float
+  x: float  # of its centre
   y: float
   z: float
-  yaw: float
-  tilt: float
+  yaw: float  # turn about z away from the axes, within +-45 degrees
+  tilt: float  # angle between its most upright side and the vertical
 
   @property
   def half(self) -> float:
@@ -37,21 +31,12 @@ class BlockView:
 
 @dataclass(slots=True)
 class View:
-  """One observation.
+  """One observation; lengths in m."""
 
-  Attributes:
-    tcp: tool centre point, m.
-    set_point: where the TCP is heading: the set-point, by the TCP's lag, m.
-    opening: mean opening of the fingers, 0 closed to 1 open.
-    opening_rate: its change over the last step, > 0 when the fingers open.
-    blue, green: the blocks.
-    control_hz: control steps a second.
-  """
-
-  tcp: Vector
-  set_point: Vector
-  opening: float
-  opening_rate: float
+  tcp: Vector  # tool centre point
+  set_point: Vector  # estimated from the TCP's velocity and its lag
+  opening: float  # mean of the fingers, 0 closed to 1 open
+  opening_rate: float  # its change over the last step, > 0 when they open
   blue: BlockView
   green: BlockView
   control_hz: int = 20
@@ -68,11 +53,7 @@ def look(observation: np.ndarray, control_hz: int = 20) -> View:
   before = (o[10] + o[11]) / 2
   return View(
     tcp=(o[0], o[1], o[2]),
-    set_point=(
-      o[0] + _LAG * o[3],
-      o[1] + _LAG * o[4],
-      o[2] + _LAG * o[5],
-    ),
+    set_point=(o[0] + _LAG * o[3], o[1] + _LAG * o[4], o[2] + _LAG * o[5]),
     opening=opening,
     opening_rate=opening - before,
     blue=_block(o[12:19]),
@@ -88,23 +69,20 @@ def _block(pose: list[float]) -> BlockView:
   return BlockView(x, y, z, yaw, tilt)
 
 
-def across(view: View, block: BlockView) -> tuple[float, float, float]:
+def across(view: View, block: BlockView) -> Vector:
   """TCP minus block, m."""
-  return (
-    view.tcp[0] - block.x,
-    view.tcp[1] - block.y,
-    view.tcp[2] - block.z,
-  )
+  x, y, z = view.tcp
+  return (x - block.x, y - block.y, z - block.z)
 
 
 def is_between_fingers(view: View, block: BlockView) -> bool:
-  """Is the block in the gap, low enough to be gripped."""
+  """Whether the block is in the gap, low enough to be gripped."""
   dx, dy, dz = across(view, block)
   return abs(dx) < 0.018 and abs(dy) < 0.022 and -0.014 < dz < 0.019
 
 
 def is_held(view: View, block: BlockView) -> bool:
-  """Have the fingers stopped at the block's width."""
+  """Whether the fingers have stopped at the block's width."""
   low, high = _GRIP
   return (
     abs(view.opening_rate) < _STILL
@@ -114,6 +92,6 @@ def is_held(view: View, block: BlockView) -> bool:
 
 
 def is_on(upper: BlockView, lower: BlockView) -> bool:
-  """Does `upper` rest on `lower`: about 4 cm higher, footprints crossing."""
+  """Whether `upper` rests on `lower`: 4 cm higher, footprints crossing."""
   apart = max(abs(upper.x - lower.x), abs(upper.y - lower.y))
   return apart < 0.030 and 0.028 < upper.z - lower.z < 0.0455

@@ -9,19 +9,9 @@ from lfgp_dmc.tasks.goals.move_object import MOVE_OBJECT
 from lfgp_dmc.tasks.goals.reach import REACH
 from lfgp_dmc.tasks.goals.stack import STACK, UNSTACK_STACK
 
-_ALL = (
-  STACK,
-  UNSTACK_STACK,
-  BRING,
-  INSERT,
-  OPEN_GRIPPER,
-  CLOSE_GRIPPER,
-  REACH,
-  LIFT,
-  MOVE_OBJECT,
-)
-
-GOALS: dict[str, Goal] = {goal.name: goal for goal in _ALL}
+_MAIN = (STACK, UNSTACK_STACK, BRING, INSERT)
+_AUXILIARY = (OPEN_GRIPPER, CLOSE_GRIPPER, REACH, LIFT, MOVE_OBJECT)
+GOALS: dict[str, Goal] = {goal.name: goal for goal in _MAIN + _AUXILIARY}
 if tuple(GOALS) != ALL_TASKS:
   raise AssertionError(f"goals {tuple(GOALS)} are not the tasks {ALL_TASKS}")
 

@@ -1,47 +1,28 @@
 """Bring and Insert: blue is let go close to, or in, its slot."""
 
+import functools
 import math
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-BRING_RADIUS = 0.03  # m, to p_s
-INSERT_RADIUS = 0.0025  # m, to p_s: reached by an inserted block alone
+_BRING_RADIUS = 0.03  # m, to p_s
+_INSERT_RADIUS = 0.0025  # m, to p_s: reached by an inserted block alone
 _DONE = 0.02  # m, of the dense rewards' bonus for letting go
-_BRING_GOAL = (*ws.BLUE_XY, ws.FLAT_Z)
+_BRING_GOAL = (*ws.BLUE_XY, ws.FLAT_Z)  # a flat block in the zone
 
 
-def is_brought(state: Snapshot) -> bool:
-  """Blue lies within 3 cm of p_s, let go."""
-  return (
-    predicates.is_released_on_tray(state)
-    and math.dist(state.blue, ws.BLUE_SLOT) < BRING_RADIUS
-  )
+def is_let_go(state: Snapshot, radius: float) -> bool:
+  """Blue touches the tray and not the robot, within `radius` of p_s, m."""
+  is_near = math.dist(state.blue, ws.BLUE_SLOT) < radius
+  return state.blue_on_tray and not state.blue_on_robot and is_near
 
 
-def is_inserted(state: Snapshot) -> bool:
-  """Blue sits within 2.5 mm of p_s, let go."""
-  return (
-    predicates.is_released_on_tray(state)
-    and math.dist(state.blue, ws.BLUE_SLOT) < INSERT_RADIUS
-  )
-
-
-def bring_terms(state: Snapshot) -> Terms:
-  """Closeness to a flat block's place in the zone (goal at z 0.145)."""
-  return _terms(state, _BRING_GOAL, 0.02)
-
-
-def insert_terms(state: Snapshot) -> Terms:
-  """Closeness to p_s."""
-  return _terms(state, ws.BLUE_SLOT, 0.001)
-
-
-def _terms(state: Snapshot, goal, threshold: float) -> Terms:
-  is_near = predicates.distance(state) <= predicates.NEAR
+def dense_terms(state: Snapshot, goal, threshold: float) -> Terms:
+  """Closeness of blue to `goal`, full within the threshold, m; then retreat."""
+  is_near = state.distance <= terms.NEAR
   is_done = math.dist(state.blue, goal) < _DONE
   is_opening = state.action[3] < 0.0
   return {
@@ -50,5 +31,13 @@ def _terms(state: Snapshot, goal, threshold: float) -> Terms:
   }
 
 
-BRING = Goal("bring", is_brought, bring_terms)
-INSERT = Goal("insert", is_inserted, insert_terms)
+BRING = Goal(
+  "bring",
+  functools.partial(is_let_go, radius=_BRING_RADIUS),
+  functools.partial(dense_terms, goal=_BRING_GOAL, threshold=0.02),
+)
+INSERT = Goal(
+  "insert",
+  functools.partial(is_let_go, radius=_INSERT_RADIUS),
+  functools.partial(dense_terms, goal=ws.BLUE_SLOT, threshold=0.001),
+)

@@ -1,8 +1,9 @@
-"""What makes a task: a success condition, its hold, its dense reward."""
+"""What makes a task: a success condition, its hold, dense reward and start."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from lfgp_dmc.tasks.goals import starts
 from lfgp_dmc.tasks.snapshot import Snapshot
 
 Terms = dict[str, float]
@@ -10,16 +11,17 @@ Terms = dict[str, float]
 
 @dataclass(frozen=True)
 class Goal:
-  """One of the nine tasks, as a condition on snapshots.
+  """One of the nine tasks.
 
   Attributes:
     name: the task's name.
     condition: the success condition at one instant (appendix "Evaluation" of
       the paper; numbers of the released code).
     dense_terms: named terms of the dense reward, whose sum is the reward.
-    is_penalised_off_tray: whether Unstack-Stack's environments add the
-      penalty for a green block that does not lie flat.
+    is_penalised_off_tray: whether the penalty for a green block that does not
+      lie flat applies, in episodes with one (`BlockStart.penalises_green`).
     hold_checks: consecutive 50 ms checks before the condition is a success.
+    start: the blocks' arrangement at the start of this task's episodes.
   """
 
   name: str
@@ -27,3 +29,4 @@ class Goal:
   dense_terms: Callable[[Snapshot], Terms]
   is_penalised_off_tray: bool = False
   hold_checks: int = 10
+  start: starts.BlockStart = starts.APART

@@ -1,45 +1,44 @@
 """Open-Gripper and Close-Gripper: command the fingers, slowly, near a block."""
 
+import functools
 import math
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-
-def is_opening(state: Snapshot) -> bool:
-  """a_g < 0, a block within 10 cm, the TCP slower than 8 cm/s."""
-  return state.action[3] < 0.0 and _is_calm(state)
+_OPEN, _CLOSE = -1.0, 1.0  # signs of a_g
+_SLOW = 0.08  # m/s, TCP
 
 
-def is_closing(state: Snapshot) -> bool:
-  """a_g > 0, a block within 10 cm, the TCP slower than 8 cm/s."""
-  return state.action[3] > 0.0 and _is_calm(state)
+def is_commanded(state: Snapshot, sign: float) -> bool:
+  """a_g of that sign, a block within 10 cm, the TCP slower than 8 cm/s."""
+  is_slow = state.tcp_speed < _SLOW
+  return sign * state.action[3] > 0.0 and is_slow and _is_near_a_block(state)
 
 
-def _is_calm(state: Snapshot) -> bool:
-  return predicates.is_slow(state) and predicates.is_near_a_block(state)
-
-
-def open_terms(state: Snapshot) -> Terms:
-  """1 for the command, less half the movement's size; near a block only."""
-  return _terms(state, state.action[3] < 0.0)
-
-
-def close_terms(state: Snapshot) -> Terms:
-  """1 for the command, less half the movement's size; near a block only."""
-  return _terms(state, state.action[3] > 0.0)
-
-
-def _terms(state: Snapshot, is_commanded: bool) -> Terms:
-  near = 1.0 if predicates.is_near_a_block(state) else 0.0
+def dense_terms(state: Snapshot, sign: float) -> Terms:
+  """1 for the command minus half the movement's size, near a block only."""
+  near = 1.0 if _is_near_a_block(state) else 0.0
   return {
-    "command": near * float(is_commanded),
+    "command": near * float(sign * state.action[3] > 0.0),
     "movement": -0.5 * near * math.hypot(*state.action[:3]),
     "limits": terms.limits(state),
   }
 
 
-OPEN_GRIPPER = Goal("open_gripper", is_opening, open_terms)
-CLOSE_GRIPPER = Goal("close_gripper", is_closing, close_terms)
+def _is_near_a_block(state: Snapshot) -> bool:
+  nearest = min(math.dist(state.tcp, xyz) for xyz in (state.blue, state.green))
+  return nearest <= terms.NEAR
+
+
+def _goal(name: str, sign: float) -> Goal:
+  return Goal(
+    name,
+    functools.partial(is_commanded, sign=sign),
+    functools.partial(dense_terms, sign=sign),
+  )
+
+
+OPEN_GRIPPER = _goal("open_gripper", _OPEN)
+CLOSE_GRIPPER = _goal("close_gripper", _CLOSE)

@@ -1,6 +1,5 @@
 """Lift: the blue block is off the tray."""
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
@@ -11,7 +10,7 @@ _TOP = 0.08  # m, where the dense reward is full
 
 def is_lifted(state: Snapshot) -> bool:
   """Blue's centre is more than 6 cm above where it lies flat."""
-  return predicates.height(state) > _HEIGHT
+  return state.height > _HEIGHT
 
 
 def dense_terms(state: Snapshot) -> Terms:
@@ -25,8 +24,8 @@ def dense_terms(state: Snapshot) -> Terms:
 
 
 def _height_term(state: Snapshot) -> float:
-  high = predicates.height(state)
-  if high < 0.005 or not predicates.are_fingers_between(state, 0.4, 0.75):
+  high = state.height
+  if high < 0.005 or not state.has_fingers_between(0.4, 0.75):
     return 0.0
   return 1.5 if high > _TOP else high / _TOP
 

@@ -1,6 +1,5 @@
 """Move-Object: the blue block moves, smoothly, for a whole second."""
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
@@ -16,11 +15,10 @@ def is_moving(state: Snapshot) -> bool:
 
 
 def dense_terms(state: Snapshot) -> Terms:
-  """Speed, less jerking, at the block; a bonus near it and for lifting."""
-  at_block = 1.0 if predicates.distance(state) < _AT_BLOCK else 0.0
+  """Speed minus jerks at the block; bonuses near it and for carrying it."""
+  at_block = 1.0 if state.distance < _AT_BLOCK else 0.0
   is_carried = (
-    predicates.are_fingers_between(state, *terms.CLOSED_ON_BLOCK)
-    and predicates.height(state) > 0.005
+    state.has_fingers_between(*terms.CLOSED_ON_BLOCK) and state.height > 0.005
   )
   return {
     "speed": 5.0 * state.blue_speed * at_block,

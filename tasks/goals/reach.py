@@ -1,6 +1,5 @@
 """Reach: the TCP is at the blue block."""
 
-from lfgp_dmc.tasks import predicates
 from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
@@ -10,7 +9,7 @@ _RADIUS = 0.015  # m
 
 def is_reached(state: Snapshot) -> bool:
   """|p_e - p_b| < 1.5 cm."""
-  return predicates.distance(state) < _RADIUS
+  return state.distance < _RADIUS
 
 
 def dense_terms(state: Snapshot) -> Terms:

@@ -9,6 +9,7 @@ from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.lfgp import LfgpConfig, build
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics
+from lfgp_dmc.runs.schedule import TrainSchedule
 
 
 class SacxTest(absltest.TestCase):
@@ -34,7 +35,7 @@ class SacxTest(absltest.TestCase):
     )
     agent = build(config, toy.TASKS, {}, replay, 1, "cpu", *widths)
     before = self._returns(agent)
-    schedule = loop.TrainSchedule(
+    schedule = TrainSchedule(
       env_steps=500, warmup_steps=100, progress_bar=False
     )
     log = metrics.MetricsLog(self.create_tempdir().full_path)

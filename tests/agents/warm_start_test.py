@@ -14,8 +14,10 @@ from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp import LfgpConfig, build
 from lfgp_dmc.agents.lfgp.prior import entropies
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics
+from lfgp_dmc.runs.schedule import TrainSchedule
 
 TASKS = ("stack", "reach", "lift")
 OBS, A = 6, 2
@@ -269,7 +271,7 @@ class KeptSuccessTest(absltest.TestCase):
     before, apart = self._success(agent), _distance(agent, shown)
     self.assertEqual(before, {"right": 1.0, "left": 1.0})
     log = metrics.MetricsLog(self.create_tempdir().full_path)
-    schedule = loop.TrainSchedule(
+    schedule = TrainSchedule(
       env_steps=1100, warmup_steps=100, progress_bar=False
     )
     loop.train(environment, agent, replay, schedule, log)
@@ -286,7 +288,7 @@ class KeptSuccessTest(absltest.TestCase):
       seed=0,
       progress=False,
     )
-    return evaluation.success_rates(rows)
+    return evaluation_csv.success_rates(rows)
 
 
 class PrecisePriorTest(absltest.TestCase):

@@ -1,21 +1,18 @@
 """BC runs from their config to their files, continued, and played."""
 
 import pathlib
-import signal
 from unittest import mock
 
 import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents.bc import BcAgent
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import configs, training
+from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
 from tests.launch import fixtures
-
-_RATES = ("wall_s", "updates_per_s")
 
 
 def _config(dataset, algorithm, **changes):
@@ -42,11 +39,6 @@ def _config(dataset, algorithm, **changes):
   return configs.to_run_config(config)
 
 
-def _rows(path: pathlib.Path) -> list[dict[str, str]]:
-  _, rows = csv_files.read(path)
-  return [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
-
-
 class CloningTest(parameterized.TestCase):
   def setUp(self):
     super().setUp()
@@ -59,7 +51,7 @@ class CloningTest(parameterized.TestCase):
     config = _config(self.dataset, algorithm)
     progress = training.train(config, run, progress_bar=False)
     self.assertTrue(progress.is_complete)
-    rows = _rows(run / "metrics.csv")
+    rows = fixtures.rows(run / "metrics.csv")
     last = rows[-1]
     self.assertEqual(int(last["env_step"]), progress.update)
     self.assertEqual(float(last["epoch"]) - float(last["best_epoch"]), 5)
@@ -67,7 +59,7 @@ class CloningTest(parameterized.TestCase):
     best = min(float(row["loss/validation"]) for row in rows)
     self.assertLessEqual(float(last["loss/best_validation"]), best)
     tasks = ("right", "left") if algorithm == "multitask_bc" else ("right",)
-    evaluated = evaluation.read_csv(run / "evaluation.csv")
+    evaluated = evaluation_csv.read_csv(run / "evaluation.csv")
     self.assertEqual({row.task for row in evaluated}, set(tasks))
     self.assertEqual(evaluated[-1].env_step, progress.update)
     self.assertFalse((run / "replay").exists())
@@ -80,15 +72,7 @@ class CloningTest(parameterized.TestCase):
     config = _config(self.dataset, "multitask_bc")
     one, other = self.folder / "one", self.folder / "other"
     whole = training.train(config, one, progress_bar=False)
-    real, calls = training._Run._checkpoint, []
-
-    def stop_after_two(run, progress):
-      real(run, progress)
-      calls.append(progress.env_step)
-      if len(calls) == 2:
-        signal.raise_signal(signal.SIGTERM)
-
-    with mock.patch.object(training._Run, "_checkpoint", stop_after_two):
+    with fixtures.stopped_after(2):
       stopped = training.train(config, other, progress_bar=False)
     self.assertFalse(stopped.is_complete)
     # What a kill after a later row would leave, too.
@@ -96,8 +80,7 @@ class CloningTest(parameterized.TestCase):
       file.write("9999,9999")
     resumed = training.train(config, other, resume=True, progress_bar=False)
     self.assertEqual(resumed.update, whole.update)
-    for name in ("metrics.csv", "evaluation.csv"):
-      self.assertEqual(_rows(other / name), _rows(one / name))
+    self.assertEqual(fixtures.numbers(other), fixtures.numbers(one))
     policies = [
       (run / "policy.safetensors").read_bytes() for run in (one, other)
     ]
@@ -125,8 +108,7 @@ class CloningTest(parameterized.TestCase):
       training.train(config, other, progress_bar=False)
     resumed = training.train(config, other, resume=True, progress_bar=False)
     self.assertEqual(resumed.update, whole.update)
-    for name in ("metrics.csv", "evaluation.csv"):
-      self.assertEqual(_rows(other / name), _rows(one / name))
+    self.assertEqual(fixtures.numbers(other), fixtures.numbers(one))
 
   def test_less_data_is_the_algorithms_own_default(self):
     self.assertEqual(configs.make_config("bc_less").pairs_per_task, 9000)
@@ -145,7 +127,7 @@ class OtherWorldsTest(absltest.TestCase):
       env_steps=100,
     )
     training.train(config, folder / "run", progress_bar=False)
-    (row,) = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    (row,) = evaluation_csv.read_csv(folder / "run" / "evaluation.csv")
     self.assertEqual((row.task, row.success), ("swingup", None))
     act = lfgp_dmc.load_policy(folder / "run")
     self.assertEqual(act(np.zeros(5, np.float32)).shape, (1,))
@@ -155,7 +137,7 @@ class DatasetHintTest(absltest.TestCase):
   def test_asks_for_the_main_task_alone(self):
     config = _config(pathlib.Path("no/where"), "bc")
     with self.assertRaisesRegex(
-      training.UserError, "--task=right --tasks=right --pairs_per_task"
+      UserError, "--task=right --tasks=right --pairs_per_task"
     ):
       training.train(config, pathlib.Path("never"), progress_bar=False)
 
@@ -174,7 +156,7 @@ class DacRunTest(absltest.TestCase):
       },
     )
     training.train(config, folder / "run", progress_bar=False)
-    rows = evaluation.read_csv(folder / "run" / "evaluation.csv")
+    rows = evaluation_csv.read_csv(folder / "run" / "evaluation.csv")
     self.assertEqual({row.task for row in rows}, {"right"})
     act = lfgp_dmc.load_policy(folder / "run")
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))

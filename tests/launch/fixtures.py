@@ -1,14 +1,19 @@
 """Small datasets and configs for the tests of launch."""
 
+import contextlib
 import dataclasses
 import pathlib
+import signal
+from collections.abc import Iterator
+from unittest import mock
 
 import numpy as np
 
 from lfgp_dmc import toy
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import csv_files, demonstrations
 from lfgp_dmc.launch import configs
+from lfgp_dmc.runs import run
 
 POINT = "lfgp_dmc.toy:PointEnvironment"
 
@@ -78,3 +83,32 @@ def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   }
   config.update_from_flattened_dict({**small, **changes})
   return configs.to_run_config(config)
+
+
+_RATES = ("wall_s", "steps_per_s", "updates_per_s")
+
+
+def rows(path: pathlib.Path) -> list[dict[str, str]]:
+  """A run's CSV file without what depends on the clock."""
+  _, found = csv_files.read(path)
+  return [{k: v for k, v in row.items() if k not in _RATES} for row in found]
+
+
+def numbers(run: pathlib.Path) -> list[list[dict[str, str]]]:
+  """The rows of a run's metrics and of its evaluations."""
+  return [rows(run / name) for name in ("metrics.csv", "evaluation.csv")]
+
+
+@contextlib.contextmanager
+def stopped_after(checkpoints: int) -> Iterator[None]:
+  """Runs within get SIGTERM after so many checkpoints."""
+  real, calls = run.Run._checkpoint, []
+
+  def checkpoint_and_stop(self, progress):
+    real(self, progress)
+    calls.append(progress.env_step)
+    if len(calls) == checkpoints:
+      signal.raise_signal(signal.SIGTERM)
+
+  with mock.patch.object(run.Run, "_checkpoint", checkpoint_and_stop):
+    yield

@@ -129,8 +129,8 @@ class RenderingTest(absltest.TestCase):
       self.assertIn(message, done.stderr)
 
   def test_frames_name_the_schedulers_choice(self):
-    cast = policies.find(_POLICY, "")
-    stage = clips.Stage(cast, clips.SCHEDULED, Look(32, 32))
+    spec = policies.find(_POLICY, "")
+    stage = clips.Stage(spec, clips.SCHEDULED, Look(32, 32))
 
     def choices(step, timestep):
       return "reach" if step < 2 else "close_gripper"

@@ -1,26 +1,18 @@
 """A run from its config to its files, continued, and refused."""
 
 import pathlib
-import signal
 from unittest import mock
 
 import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
-from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import training
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import loop, run_folder
+from lfgp_dmc.runs.schedule import Progress
 from tests.launch import fixtures
-
-_RATES = ("wall_s", "steps_per_s", "updates_per_s")
-
-
-def _rows(path: pathlib.Path) -> list[dict[str, str]]:
-  _, rows = csv_files.read(path)
-  return [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
 
 
 class TrainingTest(parameterized.TestCase):
@@ -39,8 +31,8 @@ class TrainingTest(parameterized.TestCase):
   def test_leaves_rows_checkpoints_and_a_policy(self):
     progress = self._train(self._config(evaluate_first=True))
     self.assertEqual(progress.env_step, 200)
-    self.assertLen(_rows(self.run / "metrics.csv"), 10)
-    rows = evaluation.read_csv(self.run / "evaluation.csv")
+    self.assertLen(fixtures.rows(self.run / "metrics.csv"), 10)
+    rows = evaluation_csv.read_csv(self.run / "evaluation.csv")
     self.assertEqual({row.env_step for row in rows}, {0, 100, 200})
     self.assertEqual({row.task for row in rows}, {"right", "left"})
     self.assertTrue((self.run / "checkpoints" / "000000200").is_dir())
@@ -49,26 +41,16 @@ class TrainingTest(parameterized.TestCase):
     stored = run_folder.read_config(self.run)
     self.assertEqual(stored["policy"]["env_step"], 200)
 
-  @parameterized.parameters(False, True)
-  def test_resumes_to_the_numbers_of_a_run_never_stopped(self, actor_process):
-    config = self._config(actor_process=actor_process)
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
+    config = self._config()
     self._train(config)
     other = self.folder / "runs" / "b"
-    real, calls = training._Run._checkpoint, []
-
-    def stop_after_two(run, progress):
-      real(run, progress)
-      calls.append(progress.env_step)
-      if len(calls) == 2:
-        signal.raise_signal(signal.SIGTERM)
-
-    with mock.patch.object(training._Run, "_checkpoint", stop_after_two):
+    with fixtures.stopped_after(2):
       progress = self._train(config, other)
     self.assertLess(progress.env_step, 200)
     progress = self._train(config, other, resume=True)
     self.assertEqual(progress.env_step, 200)
-    for name in ("metrics.csv", "evaluation.csv"):
-      self.assertEqual(_rows(other / name), _rows(self.run / name))
+    self.assertEqual(fixtures.numbers(other), fixtures.numbers(self.run))
 
   def test_a_finished_run_resumes_to_nothing(self):
     self._train(self._config())
@@ -134,7 +116,7 @@ class TrainingTest(parameterized.TestCase):
 
   def test_uses_the_first_pairs_alone(self):
     with mock.patch.object(loop, "train") as train:
-      train.return_value = loop.Progress()
+      train.return_value = Progress()
       self._train(self._config(pairs_per_task=20))
     agent = train.call_args.args[1]
     self.assertEqual(agent._experts._sizes.tolist(), [20, 20])

@@ -3,7 +3,6 @@
 import dataclasses
 import pathlib
 import shutil
-import signal
 from unittest import mock
 
 import numpy as np
@@ -12,15 +11,12 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
 from lfgp_dmc.agents.policy import Policy
-from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.data.stored_replay import StoredReplay
-from lfgp_dmc.launch import configs, datasets, training
+from lfgp_dmc.launch import assemble, configs, datasets, training
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
+from lfgp_dmc.runs.run import Run
 from tests.launch import fixtures
-
-_RATES = ("wall_s", "steps_per_s", "updates_per_s")
 
 
 class TwoWorlds(toy.PointEnvironment):
@@ -38,11 +34,6 @@ def _renamed(named):
 
 
 OTHER = "tests.launch.transfer_test:TwoWorlds"
-
-
-def _rows(path: pathlib.Path) -> list[dict[str, str]]:
-  _, rows = csv_files.read(path)
-  return [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
 
 
 class _RunTest(parameterized.TestCase):
@@ -73,44 +64,39 @@ class _RunTest(parameterized.TestCase):
 class SacxTest(_RunTest):
   def test_needs_no_demonstrations_and_keeps_all_rewards(self):
     path, _ = self._train(self._config("sacx"), "a")
-    stored = StoredReplay(path / "replay")
+    stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("right", "left"))
-    for transition, rewards in stored.chunks():
-      position = transition.next_observation[:, 0]
-      expected = np.stack(
-        [1 - np.abs(position - 0.8), 1 - np.abs(position + 0.8)], axis=1
-      )
-      np.testing.assert_allclose(rewards, expected, atol=1e-5)
-    (*_, last) = _rows(path / "metrics.csv")
+    rows = np.arange(len(stored))
+    position = stored.gather(rows).next_observation[:, 0]
+    expected = [1 - np.abs(position - 0.8), 1 - np.abs(position + 0.8)]
+    np.testing.assert_allclose(
+      stored.gather_rewards(rows), np.stack(expected, axis=1), atol=1e-5
+    )
+    (*_, last) = fixtures.rows(path / "metrics.csv")
     self.assertEqual(last["loss/discriminator"], "nan")
     self.assertNotEqual(last["reward/left"], "nan")
 
   def test_killed_and_resumed_it_keeps_the_rewards_and_the_numbers(self):
     config = self._config("sacx", replay_capacity=60)
     whole, _ = self._train(config, "whole")
-    real = training._Run._checkpoint
-
-    def stop_at_the_first(run, progress):
-      real(run, progress)
-      signal.raise_signal(signal.SIGTERM)
-
-    with mock.patch.object(training._Run, "_checkpoint", stop_at_the_first):
+    with fixtures.stopped_after(1):
       path, progress = self._train(config, "killed")
     self.assertLess(progress.env_step, 100)
     # As if killed later: rows beyond the checkpoint, which are to be forgotten.
     replay = Replay(
       60, 2, 2, path / "replay", slack=80, reward_tasks=("right", "left")
     )
-    for transition, rewards in StoredReplay(path / "replay").chunks(newest=5):
-      replay.add_batch(transition, 100 + rewards)
+    rows = np.arange(len(replay))[-5:]
+    replay.add_batch(replay.gather(rows), 100 + replay.gather_rewards(rows))
     replay.flush()
     del replay
     self._train(config, "killed", resume=True)
-    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
-    first, second = (
-      list(StoredReplay(run / "replay").chunks()) for run in (path, whole)
-    )
-    np.testing.assert_array_equal(first[0][1], second[0][1])
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
+    rewards = [
+      stored.gather_rewards(np.arange(len(stored)))
+      for stored in (Replay.stored(run / "replay") for run in (path, whole))
+    ]
+    np.testing.assert_array_equal(*rewards)
 
   def test_a_task_without_a_conditional_table_is_told(self):
     with self.assertRaisesRegex(UserError, "no conditional table for.*'right'"):
@@ -119,7 +105,7 @@ class SacxTest(_RunTest):
 
   def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
     config = configs.to_run_config(configs.make_config("sacx"))
-    environment = training._build_world(config)
+    environment = config.world.build(config.keeps_rewards)
     shown = environments.tasks_with_rewards(environment, ("stack", "reach"))
     self.assertEqual(shown[:2], ("stack", "reach"))
     self.assertCountEqual(shown, task_names.ALL_TASKS)
@@ -146,14 +132,14 @@ class TransferTest(_RunTest):
     source, _ = self._train(self._config(), "source")
     policy = Policy.load(source)
     started = {}
-    real = training._Run.train
+    real = Run.train
 
-    def look(run, progress_bar):
-      started["policy"] = run._agent.policy.arrays()
-      started["rows"] = len(run._replay)
-      return real(run, progress_bar)
+    def look(run):
+      started["policy"] = run.agent.policy.arrays()
+      started["rows"] = len(run.replay)
+      return real(run)
 
-    with mock.patch.object(training._Run, "train", look):
+    with mock.patch.object(Run, "train", look):
       path, _ = self._train(self._to(source), "new")
     self.assertEqual(started["rows"], 100)
     for name, array in started["policy"].items():
@@ -169,7 +155,7 @@ class TransferTest(_RunTest):
   def test_rewards_of_a_new_task_come_from_the_old_replay(self):
     """SAC-X stored the reward of "left", which becomes a task only later."""
     config = self._config("sacx", **{"env_steps": 60})
-    with mock.patch.object(training, "tasks_of", lambda *_: ("right",)):
+    with mock.patch.object(assemble, "tasks_of", lambda *_: ("right",)):
       source, _ = self._train(config, "source")
     self.assertEqual(run_folder.read_config(source)["policy"]["tasks"],
                      ["right"])  # fmt: skip
@@ -177,11 +163,12 @@ class TransferTest(_RunTest):
       source, "sacx", environment=fixtures.POINT, main_task="left"
     )
     path, _ = self._train(target, "new")
-    stored = StoredReplay(path / "replay")
+    stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("left", "right"))
-    (transition, rewards), *_ = stored.chunks()
+    rows = np.arange(len(stored))
+    rewards = stored.gather_rewards(rows)
     self.assertLen(rewards, 160)
-    position = transition.next_observation[:, 0]
+    position = stored.gather(rows).next_observation[:, 0]
     np.testing.assert_allclose(rewards[:, 0], 1 - abs(position + 0.8),
                                atol=1e-5)  # fmt: skip
 
@@ -189,17 +176,11 @@ class TransferTest(_RunTest):
     source, _ = self._train(self._config(), "source")
     config = self._to(source)
     whole, _ = self._train(config, "whole")
-    real = training._Run._checkpoint
-
-    def stop_at_the_first(run, progress):
-      real(run, progress)
-      signal.raise_signal(signal.SIGTERM)
-
-    with mock.patch.object(training._Run, "_checkpoint", stop_at_the_first):
+    with fixtures.stopped_after(1):
       path, _ = self._train(config, "killed")
     source.rename(self.folder / "moved")  # it is not needed any more
     self._train(config, "killed", resume=True)
-    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_killed_before_its_first_checkpoint_it_transfers_again(self):
     source, _ = self._train(self._config(), "source")
@@ -208,7 +189,7 @@ class TransferTest(_RunTest):
     path, _ = self._train(config, "killed")
     shutil.rmtree(path / "checkpoints")
     self._train(config, "killed", resume=True)
-    self.assertEqual(_rows(path / "metrics.csv"), _rows(whole / "metrics.csv"))
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_what_cannot_be_transferred_from_leaves_no_folder(self):
     lfgp, _ = self._train(self._config(), "lfgp")
@@ -234,7 +215,7 @@ class InitFromTest(_RunTest):
     config = self._config(
       **{"agent.init_from": str(bare), "agent.bc_weight": 1.0}
     )
-    with mock.patch.object(training._Run, "train") as train:
+    with mock.patch.object(Run, "train") as train:
       train.return_value = None
       self._train(config, "a")
     self._train(config, "a", resume=True)  # was killed at once: starts again
@@ -254,7 +235,7 @@ class ExamplesTest(_RunTest):
       }
     )
     path, _ = self._train(config, "a")
-    (*_, last) = _rows(path / "metrics.csv")
+    (*_, last) = fixtures.rows(path / "metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
     self._train(config, "a", resume=True)
 

@@ -4,70 +4,52 @@ import numpy as np
 from absl.testing import absltest
 
 import lfgp_dmc
-from lfgp_dmc.tasks import features
-from lfgp_dmc.tasks import workspace as ws
-
-_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+from lfgp_dmc.tasks.rotations import reduce_rotation
+from tests.tasks import fixtures
+from tests.tasks.fixtures import UPRIGHT, pose
 
 
 def _multiply(a, b):
   w, x, y, z = a
-  return np.array(
-    [
-      w * b[0] - x * b[1] - y * b[2] - z * b[3],
-      w * b[1] + x * b[0] + y * b[3] - z * b[2],
-      w * b[2] - x * b[3] + y * b[0] + z * b[1],
-      w * b[3] + x * b[2] - y * b[1] + z * b[0],
-    ]
-  )
+  left = [[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]
+  return np.array(left) @ b
 
 
 class ReduceRotationTest(absltest.TestCase):
   def test_equal_looking_cubes_read_equal(self):
     rng = np.random.default_rng(0)
-    quarter = np.sqrt(0.5)
-    turns = [
-      np.array([quarter, quarter, 0, 0]),
-      np.array([quarter, 0, quarter, 0]),
-      np.array([quarter, 0, 0, quarter]),
-    ]
+    turns = np.sqrt(0.5) * np.array([[1, 1, 0, 0], [1, 0, 1, 0], [1, 0, 0, 1]])
     for _ in range(50):
       quat = rng.normal(size=4)
       quat /= np.linalg.norm(quat)
-      reduced = features.reduce_rotation(quat)
-      for turn in turns:
-        other = features.reduce_rotation(_multiply(quat, turn))
-        np.testing.assert_allclose(other, reduced, atol=1e-12)
-      negated = features.reduce_rotation(-quat)
-      np.testing.assert_allclose(negated, reduced, atol=1e-12)
+      reduced = reduce_rotation(quat)
+      for other in (-quat, *(_multiply(quat, turn) for turn in turns)):
+        np.testing.assert_allclose(reduce_rotation(other), reduced, atol=1e-12)
 
   def test_angle_is_at_most_that_between_a_cube_and_its_nearest_pose(self):
     # 62.8 degrees is the farthest that a rotation is from the cube's group.
-    rng = np.random.default_rng(1)
-    quats = rng.normal(size=(2000, 4))
+    quats = np.random.default_rng(1).normal(size=(2000, 4))
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    angles = [2 * np.arccos(features.reduce_rotation(q)[0]) for q in quats]
-    self.assertLess(np.degrees(max(angles)), 62.81)
+    angles = 2 * np.arccos(reduce_rotation(quats)[:, 0])
+    self.assertLess(np.degrees(angles.max()), 62.81)
 
   def test_small_yaw_is_kept_and_a_quarter_turn_removed(self):
     small = np.array([np.cos(0.1), 0, 0, np.sin(0.1)])
-    np.testing.assert_allclose(features.reduce_rotation(small), small)
+    np.testing.assert_allclose(reduce_rotation(small), small)
     large = np.array([np.cos(0.1 + np.pi / 4), 0, 0, np.sin(0.1 + np.pi / 4)])
-    np.testing.assert_allclose(
-      features.reduce_rotation(large), small, atol=1e-12
-    )
+    np.testing.assert_allclose(reduce_rotation(large), small, atol=1e-12)
 
 
 class FeaturesTest(absltest.TestCase):
   def setUp(self):
     super().setUp()
-    self.env = lfgp_dmc.load("stack", seed=0)
+    self.env = fixtures.environment()
 
   def test_layout_is_the_released_order(self):
     timestep = self.env.reset_to(
       tcp=(0.05, 0.45, 0.25),
-      blue=[0.03, 0.52, ws.FLAT_Z, *_UPRIGHT],
-      green=[-0.1, 0.6, ws.FLAT_Z, *_UPRIGHT],
+      blue=pose(0.03, 0.52),
+      green=pose(-0.1, 0.6),
       fingers=0.5,
     )
     flat = lfgp_dmc.flatten(timestep.observation)
@@ -76,9 +58,9 @@ class FeaturesTest(absltest.TestCase):
       (3, 6): [0, 0, 0],
       (6, 12): [0.5] * 6,
       (12, 15): [0.03, 0.52, 0.145],
-      (15, 19): _UPRIGHT,
+      (15, 19): UPRIGHT,
       (19, 22): [-0.1, 0.6, 0.145],
-      (22, 26): _UPRIGHT,
+      (22, 26): UPRIGHT,
       (26, 38): [0] * 12,
       (38, 41): [-0.02, 0.07, -0.105],
       (41, 44): [-0.15, 0.15, -0.105],
@@ -92,27 +74,32 @@ class FeaturesTest(absltest.TestCase):
       )
 
   def test_finger_history_is_now_then_two_steps_ago_then_one(self):
-    self.env.reset_to(
-      tcp=(0.0, 0.5, 0.27), blue=[0.0, 0.6, ws.FLAT_Z, *_UPRIGHT]
-    )
-    readings = []
-    for _ in range(4):
-      observed = self.env.step([0, 0, 0, 1.0]).observation
-      readings.append(observed["finger_positions"])
+    self.env.reset_to(tcp=(0.0, 0.5, 0.27), blue=pose(0.0, 0.6))
+    readings = [
+      self.env.step([0, 0, 0, 1.0]).observation["finger_positions"]
+      for _ in range(4)
+    ]
     now = [reading[:2] for reading in readings]
     np.testing.assert_array_equal(readings[3][2:4], now[1])
     np.testing.assert_array_equal(readings[3][4:6], now[2])
     self.assertLess(now[3][0], now[2][0])
 
   def test_velocities_are_rates_of_positions(self):
-    self.env.reset_to(
-      tcp=(0.0, 0.5, 0.25), blue=[0.0, 0.6, ws.FLAT_Z, *_UPRIGHT]
-    )
-    for _ in range(20):
-      before = self.env.step([0.5, 0, 0, 0]).observation["ee_position"]
-    observed = self.env.step([0.5, 0, 0, 0]).observation
-    rate = (observed["ee_position"] - before) / 0.05
-    np.testing.assert_allclose(observed["ee_velocity"], rate, atol=2e-3)
+    self.env.reset_to(tcp=(0.0, 0.5, 0.25), blue=pose(0.0, 0.6))
+    before = fixtures.repeat(self.env, [0.5, 0, 0, 0], 20).observation
+    after = self.env.step([0.5, 0, 0, 0]).observation
+    rate = (after["ee_position"] - before["ee_position"]) / 0.05
+    np.testing.assert_allclose(after["ee_velocity"], rate, atol=2e-3)
+
+  def test_wrist_reads_zero_unloaded_and_the_weight_of_a_block(self):
+    self.env.reset_to(tcp=pose()[:3], blue=pose(), green=pose(0.1, 0.6))
+    unloaded = fixtures.repeat(self.env, fixtures.KEEP, 5).observation
+    np.testing.assert_allclose(unloaded["force_torque"], 0.0, atol=1e-3)
+    fixtures.repeat(self.env, [0, 0, 0, 1.0], 12)
+    fixtures.repeat(self.env, [0, 0, 1.0, 1.0], 10)
+    loaded = fixtures.repeat(self.env, [0, 0, 0, 1.0], 20).observation
+    force = np.linalg.norm(np.arctanh(loaded["force_torque"][:3])) * 100.0
+    self.assertAlmostEqual(force, 0.1 * 9.81, delta=0.05)
 
 
 if __name__ == "__main__":

@@ -29,78 +29,38 @@ def state(**changes) -> Snapshot:
   return dataclasses.replace(_REST, **changes)
 
 
+_ON_GREEN = {"blue_on_green": True, "blue_on_tray": False}
+_IN_ZONE = {"blue": (0.075, 0.5, 0.145)}
+_CLOSES = {"action": (0, 0, 0, 0.5)}
+
+
 class ConditionsTest(parameterized.TestCase):
   @parameterized.named_parameters(
     ("rest_is_no_stack", "stack", {}, False),
-    (
-      "on_green_alone",
-      "stack",
-      {"blue_on_green": True, "blue_on_tray": False},
-      True,
-    ),
+    ("on_green_alone", "stack", _ON_GREEN, True),
     ("leaning", "stack", {"blue_on_green": True}, False),
-    (
-      "held_on_green",
-      "stack",
-      {"blue_on_green": True, "blue_on_tray": False, "blue_on_robot": True},
-      False,
-    ),
-    (
-      "unstack_stack_is_stack",
-      "unstack_stack",
-      {"blue_on_green": True, "blue_on_tray": False},
-      True,
-    ),
+    ("held_on_green", "stack", {**_ON_GREEN, "blue_on_robot": True}, False),
+    ("unstack_stack_is_stack", "unstack_stack", _ON_GREEN, True),
     # 1 cm of the 3 cm is height for a flat block: 2.82 cm are left.
     ("bring_inside", "bring", {"blue": (0.075, 0.5281, 0.145)}, True),
     ("bring_outside", "bring", {"blue": (0.075, 0.5284, 0.145)}, False),
-    (
-      "bring_held",
-      "bring",
-      {"blue": (0.075, 0.5, 0.145), "blue_on_robot": True},
-      False,
-    ),
-    (
-      "bring_in_the_air",
-      "bring",
-      {"blue": (0.075, 0.5, 0.145), "blue_on_tray": False},
-      False,
-    ),
+    ("bring_held", "bring", {**_IN_ZONE, "blue_on_robot": True}, False),
+    ("bring_in_the_air", "bring", {**_IN_ZONE, "blue_on_tray": False}, False),
     ("insert_in", "insert", {"blue": (0.0774, 0.5, 0.135)}, True),
     ("insert_off", "insert", {"blue": (0.0776, 0.5, 0.135)}, False),
-    (
-      "insert_flat_over_the_slot",
-      "insert",
-      {"blue": (0.075, 0.5, 0.145)},
-      False,
-    ),
+    ("insert_flat_over_the_slot", "insert", _IN_ZONE, False),
     ("opens", "open_gripper", {"action": (0, 0, 0, -0.01)}, True),
     ("does_not_open_at_0", "open_gripper", {}, False),
+    ("closing_is_no_opening", "open_gripper", _CLOSES, False),
+    ("closes", "close_gripper", _CLOSES, True),
     (
-      "closing_is_no_opening",
-      "open_gripper",
-      {"action": (0, 0, 0, 0.5)},
-      False,
-    ),
-    ("closes", "close_gripper", {"action": (0, 0, 0, 0.5)}, True),
-    (
-      "closes_near_green",
+      "near_green",
       "close_gripper",
-      {"action": (0, 0, 0, 0.5), "tcp": (-0.15, 0.5, 0.2)},
+      {**_CLOSES, "tcp": (-0.15, 0.5, 0.2)},
       True,
     ),
-    (
-      "closes_far_away",
-      "close_gripper",
-      {"action": (0, 0, 0, 0.5), "tcp": (0.0, 0.5, 0.246)},
-      False,
-    ),
-    (
-      "closes_too_fast",
-      "close_gripper",
-      {"action": (0, 0, 0, 0.5), "tcp_speed": 0.081},
-      False,
-    ),
+    ("far_away", "close_gripper", {**_CLOSES, "tcp": (0.0, 0.5, 0.246)}, False),
+    ("too_fast", "close_gripper", {**_CLOSES, "tcp_speed": 0.081}, False),
     ("reached", "reach", {"tcp": (0.0, 0.5149, 0.145)}, True),
     ("not_reached", "reach", {"tcp": (0.0, 0.5151, 0.145)}, False),
     ("lifted", "lift", {"blue": (0.0, 0.5, 0.2051)}, True),
@@ -132,21 +92,15 @@ class RewardsTest(parameterized.TestCase):
 
   def test_limits_cost_a_tenth_of_the_push_outwards(self):
     # At the +x face, pushing out by 0.5; at the floor, pushing down by 1.
-    total = terms.limits(
-      state(tcp=(0.148, 0.5, 0.147), action=(0.5, 0.0, -1.0, 0.0))
-    )
-    self.assertAlmostEqual(total, -0.15)
-    inwards = terms.limits(
-      state(tcp=(0.148, 0.5, 0.147), action=(-1.0, 0.0, 1.0, 0.0))
-    )
-    self.assertEqual(inwards, 0.0)
+    at_edge = state(tcp=(0.148, 0.5, 0.147), action=(0.5, 0.0, -1.0, 0.0))
+    self.assertAlmostEqual(terms.limits(at_edge), -0.15)
+    inwards = dataclasses.replace(at_edge, action=(-1.0, 0.0, 1.0, 0.0))
+    self.assertEqual(terms.limits(inwards), 0.0)
 
   def test_open_is_1_less_half_the_movement_near_a_block(self):
-    total = self.total("open_gripper", action=(0.3, 0.4, 0.0, -1.0))
-    self.assertAlmostEqual(total, 0.75)
-    far = self.total(
-      "open_gripper", tcp=(0.0, 0.6, 0.28), action=(0.3, 0.4, 0.0, -1.0)
-    )
+    opens = {"action": (0.3, 0.4, 0.0, -1.0)}
+    self.assertAlmostEqual(self.total("open_gripper", **opens), 0.75)
+    far = self.total("open_gripper", tcp=(0.0, 0.6, 0.28), **opens)
     self.assertEqual(far, 0.0)
 
   def test_close_with_the_wrong_sign_pays_for_the_movement_alone(self):
@@ -154,13 +108,16 @@ class RewardsTest(parameterized.TestCase):
     self.assertAlmostEqual(total, -0.3)
 
   def test_lift_pays_height_near_and_grasp(self):
-    # Gripped 4 cm up: 0.04 / 0.08 + 0.1 + 0.3.
-    held = {"blue": (0.0, 0.5, 0.185), "tcp": (0.0, 0.5, 0.185)}
-    self.assertAlmostEqual(self.total("lift", fingers=(0.5, 0.5), **held), 0.9)
-    # Open fingers: neither height nor grasp.
-    self.assertAlmostEqual(self.total("lift", **held), 0.1)
-    high = {"blue": (0.0, 0.5, 0.235), "tcp": (0.0, 0.5, 0.235)}
-    self.assertAlmostEqual(self.total("lift", fingers=(0.5, 0.5), **high), 1.9)
+    # Gripped 4 cm up: 0.04 / 0.08 + 0.1 + 0.3. Open fingers: neither height nor
+    # grasp. 9 cm up: 1.5 + 0.1 + 0.3.
+    for z, opening, expected in (
+      (0.185, 0.5, 0.9),
+      (0.185, 1.0, 0.1),
+      (0.235, 0.5, 1.9),
+    ):
+      at = {"blue": (0.0, 0.5, z), "tcp": (0.0, 0.5, z)}
+      total = self.total("lift", fingers=(opening, opening), **at)
+      self.assertAlmostEqual(total, expected)
 
   def test_move_object_pays_speed_and_carrying_less_jerk(self):
     # 5 x 0.1 + near 0.1 + carried 0.1 - 0.1 x min(3, 1.5).
@@ -178,18 +135,11 @@ class RewardsTest(parameterized.TestCase):
     total = self.total("bring", blue=(0.035, 0.53, 0.145), tcp=(0, 0.5, 0.145))
     self.assertAlmostEqual(total, 1 - math.tanh(0.5))  # 5 cm to go
     # At the goal, opening, 2 cm away: 1.5 + 0.3 x 0.5.
-    done = self.total(
-      "bring",
-      blue=(0.075, 0.5, 0.145),
-      tcp=(0.075, 0.5, 0.165),
-      action=(0, 0, 0, -1.0),
-    )
-    self.assertAlmostEqual(done, 1.65)
+    above = {"tcp": (0.075, 0.5, 0.165), "action": (0, 0, 0, -1.0)}
+    self.assertAlmostEqual(self.total("bring", **_IN_ZONE, **above), 1.65)
 
   def test_insert_wants_a_millimetre(self):
-    almost = self.total(
-      "insert", blue=(0.075, 0.5, 0.145), tcp=(0.075, 0.5, 0.145)
-    )
+    almost = self.total("insert", **_IN_ZONE, tcp=(0.075, 0.5, 0.145))
     self.assertAlmostEqual(almost, 1 - math.tanh(0.1))
 
   def test_stack_pays_placing_retreat_lift_and_opening(self):

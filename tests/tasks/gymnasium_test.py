@@ -9,6 +9,8 @@ from absl.testing import absltest, parameterized
 
 import lfgp_dmc
 from lfgp_dmc import graphics
+from lfgp_dmc.task_names import ALL_TASKS
+from tests.tasks import fixtures
 
 if not all(map(importlib.util.find_spec, ("gymnasium", "shimmy"))):
   raise unittest.SkipTest("the extra gymnasium is not installed")
@@ -18,17 +20,7 @@ from gymnasium.utils import env_checker
 
 import lfgp_dmc.gymnasium
 
-_IDS = {
-  "stack": "lfgp_dmc/Stack-v0",
-  "unstack_stack": "lfgp_dmc/UnstackStack-v0",
-  "bring": "lfgp_dmc/Bring-v0",
-  "insert": "lfgp_dmc/Insert-v0",
-  "open_gripper": "lfgp_dmc/OpenGripper-v0",
-  "close_gripper": "lfgp_dmc/CloseGripper-v0",
-  "reach": "lfgp_dmc/Reach-v0",
-  "lift": "lfgp_dmc/Lift-v0",
-  "move_object": "lfgp_dmc/MoveObject-v0",
-}
+_IDS = {task: lfgp_dmc.gymnasium.environment_id(task) for task in ALL_TASKS}
 
 
 class GymnasiumTest(parameterized.TestCase):
@@ -42,6 +34,9 @@ class GymnasiumTest(parameterized.TestCase):
       warnings.filterwarnings("ignore", message=".*-?infinity.*")
       env_checker.check_env(env.unwrapped, skip_render_check=True)
     env.close()
+
+  def test_ids_are_the_tasks_names_in_camel_case(self):
+    self.assertEqual(_IDS["unstack_stack"], "lfgp_dmc/UnstackStack-v0")
 
   def test_plays_as_the_environment_itself_does(self):
     env = gymnasium.make(_IDS["stack"], reward="dense", time_limit=1.0)
@@ -71,9 +66,28 @@ class GymnasiumTest(parameterized.TestCase):
     np.testing.assert_array_equal(*first)
     env.close()
 
-  def test_success_is_told_and_does_not_end_the_episode(self):
+  def test_steps_environments_side_by_side(self):
+    env = gymnasium.make_vec(
+      _IDS["stack"],
+      num_envs=2,
+      vectorization_mode="async",
+      vector_kwargs={"context": "spawn"},
+    )
+    singles = [lfgp_dmc.load("stack", seed) for seed in (5, 6)]
+    together, _ = env.reset(seed=[5, 6])
+    apart = [one.reset() for one in singles]
+    random = np.random.default_rng(0)
+    for _ in range(5):
+      for row, alone in zip(together, apart, strict=True):
+        np.testing.assert_array_equal(row, lfgp_dmc.flatten(alone.observation))
+      actions = random.uniform(-1, 1, (2, 4)).astype(np.float32)
+      together, *_ = env.step(actions)
+      apart = [s.step(a) for s, a in zip(singles, actions, strict=True)]
+    env.close()
+
+  def test_success_is_reported_and_does_not_end_the_episode(self):
     env = gymnasium.make(_IDS["reach"])
-    blue = np.array([0.0, 0.5, 0.145, 1, 0, 0, 0])
+    blue = fixtures.pose()
     _, info = env.reset(options={"blue": blue, "tcp": blue[:3]})
     self.assertFalse(info["is_success"])
     for _ in range(15):

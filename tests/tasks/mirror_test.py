@@ -3,13 +3,14 @@
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import flatten, observations, tasks
+from lfgp_dmc import flatten, observations
 from lfgp_dmc.data import demonstration_checks
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.task_names import ALL_TASKS
 from lfgp_dmc.tasks import mirror
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.experts import make_expert
+from lfgp_dmc.tasks.experts import ScriptedExpert
+from tests.tasks import fixtures
 
 _STEPS = 100
 # About twice the difference that one step in twenty exceeds, by component: the
@@ -23,65 +24,58 @@ _TOLERANCE = {
 }
 
 
-def _pose(x, y, yaw, side):
-  half = side * yaw / 2
-  y = ws.CENTRE_XY[1] + side * (y - ws.CENTRE_XY[1])
-  return (x, y, ws.FLAT_Z, np.cos(half), 0.0, 0.0, np.sin(half))
-
-
-def _begin(environment, side):
+def _begin(env, side):
   """Starts with both blocks askew; side -1 is the mirror image of 1."""
-  return environment.reset_to(
+
+  def askew(x, away, yaw):
+    half, y = side * yaw / 2, ws.CENTRE_XY[1] + side * away
+    return fixtures.pose(x, y, quat=(np.cos(half), 0.0, 0.0, np.sin(half)))
+
+  return env.reset_to(
     tcp=(0.0, 0.5 + side * 0.02, 0.2),
-    blue=_pose(0.03, 0.54, 0.3, side),
-    green=_pose(-0.05, 0.47, -0.2, side),
+    blue=askew(0.03, 0.04, 0.3),
+    green=askew(-0.05, -0.03, -0.2),
   )
 
 
-def _attempt(task, steps=_STEPS):
-  environment = tasks.load(task, seed=5, control_hz=5)
-  expert = make_expert(noise=0.0, control_hz=5)
-  expert.begin(task, 0)
-  timestep = environment.reset()
-  rows = []
-  for _ in range(steps):
+def _play(env, timestep, act):
+  """The observations of an attempt, and what was done in each."""
+  rows, actions = [], []
+  for step in range(_STEPS):
     rows.append(flatten(timestep.observation))
-    timestep = environment.step(expert.act(rows[-1]))
-  return np.array(rows)
+    actions.append(act(step, rows[-1]))
+    timestep = env.step(actions[-1])
+  return np.array(rows), np.array(actions)
+
+
+def _expert(task, **options):
+  expert = ScriptedExpert(noise=0.0, **options)
+  expert.begin(task, 0)
+  return lambda step, row: expert.act(row)
 
 
 class MirrorTest(parameterized.TestCase):
   @parameterized.parameters(*(t for t in ALL_TASKS if t != "move_object"))
   def test_an_expert_does_in_the_image_the_image_of_what_it_does(self, task):
-    expert = make_expert(noise=0.0, control_hz=5)
-
-    def act(row):
-      expert.begin(task, 0)
-      return expert.act(row)
-
-    rows = _attempt(task)
+    env = fixtures.environment(task, control_hz=5)
+    env.reseed(5)
+    rows, _ = _play(env, env.reset(), _expert(task, control_hz=5))
     for row in rows:
-      np.testing.assert_allclose(
-        act(mirror.observation(row)), mirror.action(act(row)), atol=1e-3
+      # From the same draw of the gripper's magnitude.
+      image, action = (
+        _expert(task, control_hz=5)(0, seen)
+        for seen in (mirror.observation(row), row)
       )
+      np.testing.assert_allclose(image, mirror.action(action), atol=1e-3)
     self.assertGreater(np.abs(mirror.observation(rows) - rows).max(), 0.01)
 
-  def test_the_simulator_shows_in_the_image_the_image_of_what_it_shows(self):
-    environment = tasks.load("stack", seed=0)
-    expert = make_expert(noise=0.0)
-    expert.begin("stack", 0)
-    timestep = _begin(environment, 1)
-    rows, actions = [], []
-    for _ in range(_STEPS):
-      rows.append(flatten(timestep.observation))
-      actions.append(expert.act(rows[-1]))
-      timestep = environment.step(actions[-1])
-    timestep = _begin(environment, -1)
-    images = []
-    for action in actions:
-      images.append(flatten(timestep.observation))
-      timestep = environment.step(mirror.action(action))
-    expected = mirror.observation(np.array(rows))
+  def test_the_simulator_does_in_the_image_the_image_of_what_it_does(self):
+    env = fixtures.environment()
+    rows, actions = _play(env, _begin(env, 1), _expert("stack"))
+    images, _ = _play(
+      env, _begin(env, -1), lambda step, _: mirror.action(actions[step])
+    )
+    expected = mirror.observation(rows)
     error = np.quantile(np.abs(images - expected), 0.95, axis=0)
     for name, part in observations.OBSERVATION_SLICES.items():
       at = np.r_[part.slices]
@@ -89,7 +83,7 @@ class MirrorTest(parameterized.TestCase):
         self.assertLess(error[at].max(), _TOLERANCE.get(name, 0.001), name)
         continue
       for column in at:  # jolts: the sign tells
-        pair = np.array(images)[:, column], expected[:, column]
+        pair = images[:, column], expected[:, column]
         self.assertGreater(np.corrcoef(*pair)[0, 1], 0.5, column)
 
   def test_twice_is_not_at_all(self):

@@ -1,27 +1,24 @@
 """Pictures: the two cameras, and observations="vision"."""
 
-import os
-
 import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
+from lfgp_dmc import graphics
 from lfgp_dmc.observations import OBSERVATION_SLICES
+from tests.tasks import fixtures
 
-_NO_GL = os.environ.get("MUJOCO_GL", "off") in ("off", "disable", "0", "no")
 
-
-@absltest.skipIf(_NO_GL, "no OpenGL here: neither EGL nor OSMesa was found")
+@absltest.skipIf(graphics.fault(), graphics.fault())
 class RenderingTest(parameterized.TestCase):
   @parameterized.parameters("front", "three_quarter")
   def test_camera_sees_both_blocks_and_zones(self, camera):
-    env = lfgp_dmc.load("stack", seed=0)
+    env = fixtures.fresh()
     env.reset()
     picture = env.physics.render(240, 320, camera_id=camera).astype(int)
     red, green, blue = np.moveaxis(picture, -1, 0)
     self.assertGreater(np.mean(blue > 1.5 * np.maximum(red, green)), 0.002)
     self.assertGreater(np.mean(green > 1.5 * np.maximum(red, blue)), 0.002)
-    env.close()
 
   def test_vision_shows_a_camera_and_leaves_privileged_parts_out(self):
     env = lfgp_dmc.load("stack", seed=0, observations="vision")
@@ -31,8 +28,7 @@ class RenderingTest(parameterized.TestCase):
     for name, component in OBSERVATION_SLICES.items():
       self.assertEqual(name in timestep.observation, not component.privileged)
     self.assertLen(lfgp_dmc.successes(timestep.observation), 9)
-    for _ in range(10):
-      timestep = env.step([0.0, 0.0, -1.0, 1.0])
+    timestep = fixtures.repeat(env, [0.0, 0.0, -1.0, 1.0], 10)
     moved = timestep.observation["camera/front"]
     self.assertFalse(np.array_equal(first, moved))
     with self.assertRaisesRegex(KeyError, "block_positions"):

@@ -6,46 +6,35 @@ import pickle
 import numpy as np
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc import flatten, seeding, tasks
+from lfgp_dmc import flatten, seeding
 from lfgp_dmc.task_names import ALL_TASKS
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.experts import POLICIES, make_expert
+from lfgp_dmc.tasks.experts import POLICIES, ScriptedExpert
 from lfgp_dmc.tasks.experts.view import look
-
-_STEPS = 360
-_UPRIGHT = (1.0, 0.0, 0.0, 0.0)
-
-
-@functools.cache
-def _environment(task):
-  return tasks.load(task, seed=0)
+from tests.tasks import fixtures
+from tests.tasks.fixtures import environment, pose
 
 
-def _run(environment, task, timestep, seed=0):
+def _run(env, task, timestep, seed=0):
   """Plays until success; returns (succeeded, actions)."""
-  expert = make_expert()
+  expert = ScriptedExpert()
   expert.begin(task, seed)
   actions = []
-  for _ in range(_STEPS):
+  for _ in range(360):
     actions.append(expert.act(flatten(timestep.observation)))
-    timestep = environment.step(actions[-1])
+    timestep = env.step(actions[-1])
     if timestep.observation[f"success/{task}"]:
       return True, np.array(actions)
   return False, np.array(actions)
 
 
-def _pose(x, y, z=ws.FLAT_Z):
-  return (x, y, z, *_UPRIGHT)
-
-
 class ExpertTest(parameterized.TestCase):
   @parameterized.parameters(*ALL_TASKS)
-  def test_succeeds_within_the_ranges_asked_of_its_data(self, task):
-    environment = _environment(task)
-    every = []
+  def test_succeeds_within_the_ranges_required_of_its_data(self, task):
+    env, every = environment(task), []
     for i in range(3):
-      environment.reseed(seeding.derive(3, "test", i))
-      success, actions = _run(environment, task, environment.reset(), i)
+      env.reseed(seeding.derive(3, "test", i))
+      success, actions = _run(env, task, env.reset(), i)
       self.assertTrue(success, f"reset {i}")
       every.append(actions)
     actions = np.concatenate(every)
@@ -62,36 +51,36 @@ class ExpertTest(parameterized.TestCase):
   def test_succeeds_at_other_control_rates_in_as_much_time(
     self, task, control_hz
   ):
-    environment = tasks.load(task, seed=0, control_hz=control_hz)
-    expert = make_expert(control_hz=control_hz)
+    env = environment(task, control_hz=control_hz)
+    expert = ScriptedExpert(control_hz=control_hz)
     for i in range(2):
-      environment.reseed(seeding.derive(3, "test", i))
+      env.reseed(seeding.derive(3, "test", i))
       expert.begin(task, i)
-      timestep = environment.reset()
+      timestep = env.reset()
       for _ in range(10 * control_hz):
-        timestep = environment.step(expert.act(flatten(timestep.observation)))
+        timestep = env.step(expert.act(flatten(timestep.observation)))
       self.assertTrue(timestep.observation[f"success/{task}"], f"reset {i}")
 
   @parameterized.parameters(*ALL_TASKS)
   def test_the_observation_alone_decides(self, task):
-    environment = _environment(task)
-    environment.reseed(11)
-    timestep = environment.reset()
-    whole = make_expert(noise=0.0)
+    env = environment(task)
+    env.reseed(11)
+    timestep = env.reset()
+    whole = ScriptedExpert(noise=0.0)
     whole.begin(task, 0)
     for step in range(120):
       observation = flatten(timestep.observation)
       action = whole.act(observation)
-      fresh = make_expert(noise=0.0)
+      fresh = ScriptedExpert(noise=0.0)
       fresh.begin(task, step + 1)
       np.testing.assert_array_equal(fresh.act(observation)[:3], action[:3])
-      timestep = environment.step(action)
+      timestep = env.step(action)
 
   def test_the_seed_decides_the_noise(self):
-    observation = flatten(_environment("reach").reset().observation)
+    observation = flatten(environment("reach").reset().observation)
     actions = []
     for seed in (1, 1, 2):
-      expert = make_expert()
+      expert = ScriptedExpert()
       expert.begin("reach", seed)
       actions.append(expert.act(observation))
     np.testing.assert_array_equal(actions[0], actions[1])
@@ -99,13 +88,13 @@ class ExpertTest(parameterized.TestCase):
 
   def test_unknown_task_and_noise_list_the_valid_ones(self):
     with self.assertRaisesRegex(ValueError, "'fly'; valid tasks: stack, "):
-      make_expert().begin("fly", 0)
+      ScriptedExpert().begin("fly", 0)
     with self.assertRaisesRegex(ValueError, "valid is 0 or more"):
-      make_expert(noise=-0.1)
+      ScriptedExpert(noise=-0.1)
     self.assertEqual(tuple(POLICIES), ALL_TASKS)
 
   def test_the_factory_goes_to_workers(self):
-    make = pickle.loads(pickle.dumps(functools.partial(make_expert, 0.2)))
+    make = pickle.loads(pickle.dumps(functools.partial(ScriptedExpert, 0.2)))
     make().begin("lift", 0)
 
 
@@ -116,15 +105,15 @@ class PlayStatesTest(parameterized.TestCase):
     "reach", "lift", "stack", "open_gripper", "close_gripper", "move_object"
   )
   def test_blue_in_its_slot(self, task):
-    self._check(task, tcp=(0.075, 0.5, 0.17), blue=_pose(*ws.BLUE_SLOT))
+    self._check(task, tcp=(0.075, 0.5, 0.17), blue=pose(*ws.BLUE_SLOT))
 
   @parameterized.parameters("reach", "lift", "move_object", "stack")
   def test_green_on_blue(self, task):
     self._check(
       task,
       tcp=(0.0, 0.5, 0.26),
-      blue=_pose(-0.02, 0.46),
-      green=_pose(-0.02, 0.46, ws.STACKED_Z),
+      blue=pose(-0.02, 0.46),
+      green=pose(-0.02, 0.46, ws.STACKED_Z),
     )
 
   @parameterized.parameters("reach", "lift", "bring", "move_object")
@@ -132,37 +121,32 @@ class PlayStatesTest(parameterized.TestCase):
     self._check(
       task,
       tcp=(0.0, 0.5, 0.26),
-      blue=_pose(0.03, 0.55, ws.STACKED_Z),
-      green=_pose(0.03, 0.55),
+      blue=pose(0.03, 0.55, ws.STACKED_Z),
+      green=pose(0.03, 0.55),
     )
 
   @parameterized.parameters("reach", "open_gripper", "stack", "bring")
   def test_green_in_hand(self, task):
-    environment = _environment("stack")
-    timestep = environment.reset_to(
-      tcp=(0.0, 0.5, 0.151), green=_pose(0.0, 0.5), blue=_pose(-0.1, 0.5)
-    )
-    for _ in range(12):
-      timestep = environment.step((0, 0, 0, 1))
-    for _ in range(10):
-      timestep = environment.step((0, 0, 0.5, 1))
+    env = environment()
+    env.reset_to(tcp=(0.0, 0.5, 0.151), green=pose(), blue=pose(-0.1))
+    fixtures.repeat(env, (0, 0, 0, 1), 12)
+    timestep = fixtures.repeat(env, (0, 0, 0.5, 1), 10)
     self.assertGreater(look(flatten(timestep.observation)).green.z, 0.17)
-    environment.clear_success()
-    self.assertTrue(_run(environment, task, timestep)[0])
+    env.clear_success()
+    self.assertTrue(_run(env, task, timestep)[0])
 
   @parameterized.parameters("reach", "lift")
   def test_blocks_touching_along_y(self, task):
     self._check(
       task,
       tcp=(0.0, 0.5, 0.2),
-      blue=_pose(0.0, 0.48),
-      green=_pose(0.005, 0.5202),
+      blue=pose(0.0, 0.48),
+      green=pose(0.005, 0.5202),
     )
 
   def _check(self, task, **start):
-    environment = _environment("stack")
-    timestep = environment.reset_to(**start)
-    self.assertTrue(_run(environment, task, timestep)[0])
+    env = environment()
+    self.assertTrue(_run(env, task, env.reset_to(**start))[0])
 
 
 if __name__ == "__main__":

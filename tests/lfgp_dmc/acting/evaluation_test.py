@@ -9,7 +9,8 @@ from absl.testing import absltest
 
 from lfgp_dmc import toy
 from lfgp_dmc.acting import environments, evaluation
-from lfgp_dmc.acting.evaluation import EvaluationRow
+from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 
 _ROWS = [
   EvaluationRow(1000, "right", 0, 7, 1, 4, 2.5),
@@ -75,9 +76,9 @@ class EvaluateTest(absltest.TestCase):
 class FilesTest(absltest.TestCase):
   def test_round_trip_and_append(self):
     path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
-    evaluation.write_csv(path, _ROWS)
-    evaluation.append_csv(path, _ROWS[:1])
-    self.assertEqual(evaluation.read_csv(path), [*_ROWS, _ROWS[0]])
+    evaluation_csv.append_csv(path, _ROWS)
+    evaluation_csv.append_csv(path, _ROWS[:1])
+    self.assertEqual(evaluation_csv.read_csv(path), [*_ROWS, _ROWS[0]])
     lines = path.read_text().splitlines()
     self.assertEqual(
       lines[0], "env_step,task,episode,seed,success,steps_to_success,return"
@@ -88,13 +89,13 @@ class FilesTest(absltest.TestCase):
     path = pathlib.Path(self.create_tempdir().full_path) / "a.csv"
     path.write_text("env_step\n1\n")
     with self.assertRaisesRegex(ValueError, "a.csv is no evaluation"):
-      evaluation.read_csv(path)
+      evaluation_csv.read_csv(path)
 
   def test_table(self):
-    lines = evaluation.success_table(_ROWS).splitlines()
+    lines = evaluation_csv.success_table(_ROWS).splitlines()
     self.assertEqual(lines[1].split(), ["right", "50.0%", "2", "4.0", "1.30"])
     self.assertEqual(lines[2].split(), ["left", "-", "1", "-", "-3.00"])
-    self.assertEqual(evaluation.success_rates(_ROWS)["right"], 0.5)
+    self.assertEqual(evaluation_csv.success_rates(_ROWS)["right"], 0.5)
 
 
 class EnvironmentsTest(absltest.TestCase):

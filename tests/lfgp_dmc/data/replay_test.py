@@ -1,13 +1,13 @@
 """The replay: ring, sampling, withdrawing, mapped files."""
 
 import json
-import pathlib
 
 import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
+from tests import fixtures
 
 
 def _transition(number: float) -> Transition:
@@ -109,10 +109,10 @@ class ReplayTest(parameterized.TestCase):
       Replay(4, 3, 2).gather_rewards(np.array([0]))
 
 
-class MappedReplayTest(absltest.TestCase):
+class MappedReplayTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path) / "replay"
+    self._folder = self.folder / "replay"
 
   def test_a_flushed_replay_reopens_with_its_rows(self):
     replay = Replay(6, 3, 2, self._folder)
@@ -166,6 +166,48 @@ class MappedReplayTest(absltest.TestCase):
     (self._folder / "action.npy").write_bytes(b"nothing")
     with self.assertRaisesRegex(ValueError, "action.npy"):
       Replay(4, 3, 2, self._folder)
+
+  def test_other_reward_tasks_are_refused(self):
+    Replay(4, 3, 2, self._folder, reward_tasks=("lift", "reach")).flush()
+    with self.assertRaisesRegex(ValueError, "expected .*'reach', 'lift'"):
+      Replay(4, 3, 2, self._folder, reward_tasks=("reach", "lift"))
+
+  def test_holds_the_rows_that_could_be_sampled(self):
+    replay = Replay(4, 3, 2, self._folder, slack=2, reward_tasks=("a", "b"))
+    for number in range(7):
+      replay.add(_transition(number), np.array([10, 20]) * number)
+    replay.flush()
+    stored = Replay.stored(self._folder)
+    self.assertEqual(_numbers(stored), [3, 4, 5, 6])
+    self.assertEqual((stored.widths, stored.reward_tasks), ((3, 2), ("a", "b")))
+    with self.assertRaisesRegex(ValueError, "read-only"):
+      stored.add(_transition(8), np.zeros(2))
+
+  def test_another_replay_copies_what_it_has_room_for(self):
+    source = Replay(8, 3, 2, reward_tasks=("a", "b"))
+    for number in range(5):
+      source.add(_transition(number), np.array([10, 20]) * number)
+    copy = Replay(2, 3, 2, reward_tasks=("b",))
+    self.assertEqual(copy.copy_from(source), 2)
+    self.assertEqual(_numbers(copy), [3, 4])
+    np.testing.assert_array_equal(
+      copy.gather_rewards(np.arange(2)), [[60], [80]]
+    )
+    with self.assertRaisesRegex(ValueError, "no rewards of c; it keeps: a, b"):
+      Replay(2, 3, 2, reward_tasks=("c",)).copy_from(source)
+    with self.assertRaisesRegex(ValueError, r"have \(3, 2\) floats.*\(4, 2\)"):
+      Replay(2, 4, 2).copy_from(source)
+
+  def test_faults_name_the_file(self):
+    with self.assertRaisesRegex(ValueError, "no replay in .*replay.json is mi"):
+      Replay.stored(self._folder)
+    Replay(4, 3, 2, self._folder).flush()
+    (self._folder / "action.npy").write_bytes(b"not an array")
+    with self.assertRaisesRegex(ValueError, "action.npy is damaged"):
+      Replay.stored(self._folder)
+    (self._folder / "replay.json").write_text('{"size": 4}')
+    with self.assertRaisesRegex(ValueError, "replay.json is damaged"):
+      Replay.stored(self._folder)
 
 
 if __name__ == "__main__":

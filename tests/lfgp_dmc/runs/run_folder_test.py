@@ -1,7 +1,6 @@
 """A run's files: CSV and TensorBoard, folder and config, atomic writing."""
 
 import datetime
-import pathlib
 
 from absl.testing import absltest
 from tensorboard.backend.event_processing import event_accumulator
@@ -9,37 +8,32 @@ from tensorboard.backend.event_processing import event_accumulator
 from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.metrics import MetricsLog
+from tests import fixtures
 
 
-class _FolderTest(absltest.TestCase):
-  def setUp(self):
-    super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
-
-
-class FilesTest(_FolderTest):
+class FilesTest(fixtures.FolderTest):
   def test_a_failed_write_keeps_what_was_there(self):
-    path = self._folder / "a.json"
+    path = self.folder / "a.json"
     files.write_json(path, {"kept": 1})
     with self.assertRaises(KeyboardInterrupt), files.replacing(path) as aside:
       aside.write_text("half")
       raise KeyboardInterrupt
     self.assertEqual(files.read_json(path), {"kept": 1})
-    self.assertLen(list(self._folder.iterdir()), 1)
+    self.assertLen(list(self.folder.iterdir()), 1)
 
   def test_bad_json_is_named(self):
-    path = self._folder / "a.json"
+    path = self.folder / "a.json"
     path.write_text("{")
     with self.assertRaisesRegex(ValueError, "a.json is not valid JSON"):
       files.read_json(path)
 
 
-class MetricsLogTest(_FolderTest):
+class MetricsLogTest(fixtures.FolderTest):
   def _rows(self):
-    return csv_files.read(self._folder / "metrics.csv")
+    return csv_files.read(self.folder / "metrics.csv")
 
   def test_rows_are_on_disk_at_once(self):
-    log = MetricsLog(self._folder)
+    log = MetricsLog(self.folder)
     log.write({"env_step": 500, "loss/critic": 1.5})
     log.write({"env_step": 1000})
     columns, rows = self._rows()
@@ -47,7 +41,7 @@ class MetricsLogTest(_FolderTest):
     self.assertEqual([row["loss/critic"] for row in rows], ["1.5", ""])
 
   def test_a_later_unknown_column_is_named(self):
-    log = MetricsLog(self._folder)
+    log = MetricsLog(self.folder)
     log.write({"env_step": 500, "a": 1})
     with self.assertRaisesRegex(ValueError, r"\['b'\]"):
       log.write({"env_step": 1000, "b": 1})
@@ -55,33 +49,32 @@ class MetricsLogTest(_FolderTest):
       log.write({"a": 1})
 
   def test_resume_cuts_back_and_goes_on(self):
-    log = MetricsLog(self._folder)
+    log = MetricsLog(self.folder)
     for step in (500, 1000, 1500):
       log.write({"env_step": step, "a": step})
     log.close()
-    with open(self._folder / "metrics.csv", "a") as file:
+    with open(self.folder / "metrics.csv", "a") as file:
       file.write("2000,2")  # torn by a kill
-    log = MetricsLog(self._folder)
-    self.assertEqual(log.columns, ("env_step", "a"))
+    log = MetricsLog(self.folder)
     log.truncate_after(1000)
     log.write({"env_step": 1200, "a": 7})
     steps = [row["env_step"] for row in self._rows()[1]]
     self.assertEqual(steps, ["500", "1000", "1200"])
 
   def test_tensorboard_reads_the_events(self):
-    log = MetricsLog(self._folder)
+    log = MetricsLog(self.folder)
     log.write({"env_step": 500, "loss/critic": 1.5})
     log.write_scalars(600, {"success/reach": 0.5})
     log.close()
     events = event_accumulator.EventAccumulator(
-      str(self._folder / "tensorboard")
+      str(self.folder / "tensorboard")
     ).Reload()
     (scalar,) = events.Scalars("loss/critic")
     self.assertEqual((scalar.step, scalar.value), (500, 1.5))
     self.assertEqual(events.Scalars("success/reach")[0].step, 600)
 
   def test_other_columns_are_not_appended(self):
-    path = self._folder / "a.csv"
+    path = self.folder / "a.csv"
     csv_files.append(path, ["env_step", "x"], [{"env_step": 1, "x": 2}])
     csv_files.append(path, ["env_step", "x"], [{"env_step": 2, "x": 3}])
     with self.assertRaisesRegex(ValueError, "expected"):
@@ -89,10 +82,10 @@ class MetricsLogTest(_FolderTest):
     self.assertLen(csv_files.read(path)[1], 2)
 
 
-class RunFolderTest(_FolderTest):
+class RunFolderTest(fixtures.FolderTest):
   def test_create_read_resume(self):
     config = {"seed": 0, "agent": {"xi": 45, "sizes": (256, 256)}}
-    run = run_folder.create(self._folder / "runs" / "a", config)
+    run = run_folder.create(self.folder / "runs" / "a", config)
     self.assertEqual(run_folder.read_config(run.path)["seed"], 0)
     with self.assertRaisesRegex(run_folder.RunFolderError, "--resume"):
       run_folder.create(run.path, config)
@@ -103,9 +96,7 @@ class RunFolderTest(_FolderTest):
     self.assertEqual(run_folder.resume(path, config).path, path)
 
   def test_a_changed_config_is_refused_by_field(self):
-    run = run_folder.create(
-      self._folder / "a", {"seed": 0, "agent": {"xi": 45}}
-    )
+    run = run_folder.create(self.folder / "a", {"seed": 0, "agent": {"xi": 45}})
     with self.assertRaises(run_folder.RunFolderError) as caught:
       run_folder.resume(run.path, {"seed": 0, "agent": {"xi": 9, "new": True}})
     self.assertIn("agent.xi (45, now 9)", str(caught.exception))
@@ -113,7 +104,7 @@ class RunFolderTest(_FolderTest):
     self.assertNotIn("seed", str(caught.exception))
 
   def test_what_the_run_added_is_no_change(self):
-    run = run_folder.create(self._folder / "a", {"seed": 0})
+    run = run_folder.create(self.folder / "a", {"seed": 0})
     files.write_json(run.config, {"seed": 0, "policy": {"tasks": ["reach"]}})
     path = run.path
     del run
@@ -122,18 +113,18 @@ class RunFolderTest(_FolderTest):
   def test_what_is_no_run_is_refused(self):
     for text, message in ((None, "has no"), ("{", "JSON"), ("[]", "no config")):
       if text is not None:
-        (self._folder / "config.json").write_text(text)
+        (self.folder / "config.json").write_text(text)
       with self.assertRaisesRegex(run_folder.RunFolderError, message):
-        run_folder.resume(self._folder, {})
+        run_folder.resume(self.folder, {})
     with self.assertRaisesRegex(run_folder.RunFolderError, "no run folder"):
-      run_folder.read_config(self._folder / "none")
+      run_folder.read_config(self.folder / "none")
 
   def test_default_path_is_new(self):
     now = datetime.datetime(2022, 1, 31, 12, 0, 5)
-    first = run_folder.default_path("lfgp", "stack", self._folder, now)
+    first = run_folder.default_path("lfgp", "stack", self.folder, now)
     self.assertEqual(first.name, "20220131_120005_lfgp_stack")
     first.mkdir()
-    second = run_folder.default_path("lfgp", "stack", self._folder, now)
+    second = run_folder.default_path("lfgp", "stack", self.folder, now)
     self.assertEqual(second.name, "20220131_120005_lfgp_stack_2")
 
 

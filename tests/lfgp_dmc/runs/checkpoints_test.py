@@ -7,6 +7,7 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.runs import checkpoints, pytree
+from tests import fixtures
 
 _STATE = {
   "agent": {
@@ -19,10 +20,10 @@ _STATE = {
 }
 
 
-class CheckpointsTest(parameterized.TestCase):
+class CheckpointsTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path) / "checkpoints"
+    self._folder = self.folder / "checkpoints"
 
   def _save(self, *steps: int, run_steps=None):
     for step in steps:

@@ -22,40 +22,12 @@ import minari
 from minari import data_collector
 
 from lfgp_dmc.data import minari_datasets
-
-_ATTRIBUTES = {
-  "task": "reach",
-  "main_task": "stack",
-  "collection": "reset",
-  "expert": "scripted",
-  "seed": 3,
-  "control_hz": 20,
-}
+from tests import fixtures
 
 
-def _demonstrations(lengths=(4, 1, 6)) -> demonstrations.Demonstrations:
-  """Three attempts that move on row by row; the last one is cut."""
-  random = np.random.default_rng(0)
-  total = sum(lengths)
-  episode = np.repeat(np.arange(len(lengths)), lengths).astype(np.int32)
-  states = random.normal(size=(total + 1, 5)).astype(np.float32)
-  is_last = np.append(np.diff(episode) > 0, False)
-  observation, after = states[:-1].copy(), states[1:].copy()
-  after[is_last] += 1
-  return demonstrations.Demonstrations(
-    observation,
-    random.uniform(-1, 1, (total, 2)).astype(np.float32),
-    after,
-    episode,
-    is_last,
-    _ATTRIBUTES,
-  )
-
-
-class MinariTest(absltest.TestCase):
+class MinariTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.enter_context(
       mock.patch.dict(
         os.environ, {"MINARI_DATASETS_PATH": str(self.folder / "minari")}
@@ -63,7 +35,7 @@ class MinariTest(absltest.TestCase):
     )
 
   def test_comes_back_as_it_went(self):
-    data = _demonstrations()
+    data = fixtures.demonstrations(4, 1, 6)
     stored = minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
     self.assertEqual((stored.total_episodes, stored.total_steps), (3, 11))
     first, _, last = list(minari.load_dataset("lfgp_dmc/a/reach-v0"))
@@ -74,13 +46,13 @@ class MinariTest(absltest.TestCase):
     for name, array in data.arrays().items():
       np.testing.assert_array_equal(back.arrays()[name], array, name)
       self.assertEqual(back.arrays()[name].dtype, array.dtype)
-    self.assertEqual(back.attributes, _ATTRIBUTES)
+    self.assertEqual(back.attributes, fixtures.ATTRIBUTES)
     demonstrations.write(self.folder / "reach.hdf5", back)
     with self.assertRaisesRegex(ValueError, "exists; choose another"):
       minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
 
   def test_what_does_not_fit_is_named(self):
-    data = _demonstrations()
+    data = fixtures.demonstrations(4, 1, 6)
     data.observation[2] += 1
     with self.assertRaisesRegex(ValueError, "row 2 does not start where"):
       minari_datasets.to_minari(data, "a-v0")
@@ -106,7 +78,7 @@ class MinariTest(absltest.TestCase):
   def test_the_command_converts_folders(self):
     ours = self.folder / "ours"
     ours.mkdir()
-    demonstrations.write(ours / "reach.hdf5", _demonstrations())
+    demonstrations.write(ours / "reach.hdf5", fixtures.demonstrations(4, 1, 6))
     script = pathlib.Path(command.__file__).with_name("convert_minari.py")
     for arguments, said in (
       (["--dataset=ours", "--minari=lfgp_dmc/b"], "lfgp_dmc/b/reach-v0"),

@@ -1,22 +1,23 @@
-"""The loop without an environment, with a toy learner."""
+"""The loop without an environment, with a toy agent."""
 
 import os
-import pathlib
 import signal
 
 from absl.testing import absltest
 
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.runs import supervised
-from lfgp_dmc.runs.loop import Progress, TrainSchedule
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from tests import fixtures
 
 
-class _Learner:
+class _Agent(fixtures.ToyAgent):
   """Counts; epochs have ten updates."""
 
   def __init__(self, converges_after=None, on_update=None):
-    self.updates = self.epochs = 0
+    super().__init__()
+    self.epochs = 0
     self._converges_after = converges_after
     self._on_update = on_update
 
@@ -28,7 +29,7 @@ class _Learner:
     return 10
 
   def update(self):
-    self.updates += 1
+    super().update()
     if self._on_update:
       self._on_update(self.updates)
 
@@ -39,13 +40,12 @@ class _Learner:
     return {"epoch": float(self.epochs), "loss/train": 1.0 / self.updates}
 
 
-class SupervisedTest(absltest.TestCase):
+class SupervisedTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
     self._evaluated, self._saved = [], []
 
-  def _train(self, learner, progress=None, **schedule):
+  def _train(self, agent, progress=None, **schedule):
     options = {
       "env_steps": 100,
       "log_every": 25,
@@ -54,61 +54,61 @@ class SupervisedTest(absltest.TestCase):
       "progress_bar": False,
     } | schedule
     return supervised.train(
-      learner,
+      agent,
       TrainSchedule(**options),
-      MetricsLog(self._folder),
+      MetricsLog(self.folder),
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.is_complete)),
       progress=progress,
     )
 
   def _steps(self):
-    rows = csv_files.read(self._folder / "metrics.csv")[1]
+    rows = csv_files.read(self.folder / "metrics.csv")[1]
     return [int(row["env_step"]) for row in rows]
 
   def test_everything_happens_when_due(self):
-    learner = _Learner()
-    progress = self._train(learner)
+    agent = _Agent()
+    progress = self._train(agent)
     self.assertEqual((progress.update, progress.env_step), (100, 100))
     self.assertTrue(progress.is_complete)
-    self.assertEqual((learner.updates, learner.epochs), (100, 10))
+    self.assertEqual((agent.updates, agent.epochs), (100, 10))
     self.assertEqual(self._steps(), [25, 50, 75, 100])
     self.assertEqual(self._evaluated, [50, 90, 100])  # at epochs' ends
     self.assertEqual(self._saved, [(40, False), (70, False), (100, True)])
 
   def test_convergence_ends_it_with_a_row_and_a_checkpoint(self):
-    progress = self._train(_Learner(converges_after=3))
+    progress = self._train(_Agent(converges_after=3))
     self.assertTrue(progress.is_complete)
     self.assertEqual(self._steps(), [25, 30])
     self.assertEqual(self._evaluated, [30])
     self.assertEqual(self._saved, [(30, True)])
 
   def test_the_most_updates_cut_an_epoch(self):
-    learner = _Learner()
-    self.assertEqual(self._train(learner, env_steps=33).update, 33)
-    self.assertEqual((learner.updates, learner.epochs), (33, 4))
+    agent = _Agent()
+    self.assertEqual(self._train(agent, env_steps=33).update, 33)
+    self.assertEqual((agent.updates, agent.epochs), (33, 4))
     self.assertEqual(self._steps()[-1], 33)
 
   def test_a_signal_finishes_the_epoch_and_resume_goes_on(self):
-    learner = _Learner(
+    agent = _Agent(
       on_update=lambda n: n == 12 and os.kill(os.getpid(), signal.SIGTERM)
     )
     with self.assertLogs(level="WARNING"):
-      progress = self._train(learner)
+      progress = self._train(agent)
     self.assertEqual(self._saved, [(20, False)])
     self.assertFalse(progress.is_complete)
     self.assertEqual(self._evaluated, [])
-    self._train(learner, progress=progress)
-    self.assertEqual(learner.updates, 100)
+    self._train(agent, progress=progress)
+    self.assertEqual(agent.updates, 100)
     self.assertEqual(self._saved[-1], (100, True))
 
   def test_a_finished_run_is_left_alone(self):
     progress = Progress(env_step=30, update=30, is_complete=True)
-    self.assertEqual(self._train(_Learner(), progress=progress).update, 30)
+    self.assertEqual(self._train(_Agent(), progress=progress).update, 30)
     self.assertEqual((self._evaluated, self._saved), ([], []))
 
   def test_may_evaluate_first(self):
-    self._train(_Learner(converges_after=1), evaluate_first=True)
+    self._train(_Agent(converges_after=1), evaluate_first=True)
     self.assertEqual(self._evaluated, [0, 10])
 
 

@@ -8,11 +8,12 @@ import numpy as np
 from absl.testing import absltest
 
 from lfgp_dmc import toy
-from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import csv_files
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.runs import checkpoints, loop, resuming, run_folder
-from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs import checkpoints, run, run_folder
+from lfgp_dmc.runs.schedule import TrainSchedule
+from tests import fixtures
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")
 _CONFIG = {"seed": 3}
@@ -22,30 +23,22 @@ class _Killed(BaseException):
   """What `kill -9` looks like from inside."""
 
 
-class _Agent:
+class _Agent(fixtures.ToyAgent):
   """Its weights follow every row it samples: any difference shows."""
 
-  tasks = toy.TASKS
-
   def __init__(self, replay, die_at=None):
+    super().__init__()
     self._replay = replay
-    self._random = np.random.default_rng(3)
     self._weights = np.zeros(2, np.float32)
     self._summed = 0.0
     self._acts = 0
     self._die_at = die_at
 
-  def prepare(self, progress_bar):
-    pass
-
-  def begin_episode(self):
-    pass
-
   def act(self, observation):
     self._acts += 1
     if self._acts == self._die_at:
       raise _Killed
-    noise = self._random.normal(0, 0.5, 2)
+    noise = self.random.normal(0, 0.5, 2)
     action = np.clip(self._weights + observation + noise, -1, 1)
     return action.astype(np.float32)
 
@@ -53,7 +46,7 @@ class _Agent:
     self._weights *= np.float32(0.9) + episode.action.mean() / 10
 
   def update(self):
-    rows = self._replay.gather(self._replay.sample_indices(self._random, 4))
+    rows = self._replay.gather(self._replay.sample_indices(self.random, 4))
     self._weights += 0.01 * rows.observation.mean(axis=0)
     self._summed += float(rows.action.sum())
 
@@ -61,53 +54,54 @@ class _Agent:
     summed, self._summed = self._summed, 0.0
     return {"loss/critic": summed, "q/right": float(self._weights[0])}
 
+  def policy_arrays(self):
+    return {"weights": self._weights.copy()}
+
   def state_dict(self):
     return {
-      "random": self._random.bit_generator.state,
+      "random": self.random.bit_generator.state,
       "weights": self._weights.copy(),
       "summed": self._summed,
     }
 
   def load_state_dict(self, state):
-    self._random.bit_generator.state = state["random"]
+    self.random.bit_generator.state = state["random"]
     self._weights = state["weights"].copy()
     self._summed = state["summed"]
 
 
-class ResumingTest(absltest.TestCase):
+class ResumingTest(fixtures.FolderTest):
   def _run(self, path: pathlib.Path, die_at=None, resume=False):
     """Trains 400 steps, or until the kill; a full ring with slack."""
-    open_run = run_folder.resume if resume else run_folder.create
-    run = open_run(path, _CONFIG)
-    replay = Replay(120, 2, 2, run.replay, slack=100)
-    agent = _Agent(replay, die_at)
-    log = MetricsLog(run.path)
-    progress = resuming.restore(run, agent, replay, log) if resume else None
-
-    def evaluate(step):
-      row = evaluation.EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)
-      evaluation.append_csv(run.evaluation, [row])
-      return {"right": 1.0}
-
-    schedule = loop.TrainSchedule(
-      env_steps=400,
-      log_every=15,
-      evaluate_every=100,
-      checkpoint_every=60,
-      warmup_steps=30,
-      progress_bar=False,
-    )
-    loop.train(
-      toy.PointEnvironment(fail_every=0),
-      agent,
+    open_folder = run_folder.resume if resume else run_folder.create
+    folder = open_folder(path, _CONFIG)
+    replay = Replay(120, 2, 2, folder.replay, slack=100)
+    made = run.Run(
+      folder,
+      _Agent(replay, die_at),
+      toy.PointEnvironment(),
       replay,
-      schedule,
-      log,
-      evaluate,
-      lambda at: resuming.save(run, agent, replay, at, 400),
+      TrainSchedule(
+        env_steps=400,
+        log_every=15,
+        evaluate_every=100,
+        checkpoint_every=60,
+        warmup_steps=30,
+        progress_bar=False,
+      ),
+      lambda step: [EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)],
+      _CONFIG,
       seed=3,
-      progress=progress,
     )
+    if resume:
+      made.restore()
+    made.train()
+
+  def _killed(self, die_at: int) -> pathlib.Path:
+    path = self.folder / "killed"
+    with self.assertRaises(_Killed):
+      self._run(path, die_at)
+    return path
 
   def _numbers(self, path: pathlib.Path):
     rows = csv_files.read(path / "metrics.csv")[1]
@@ -116,14 +110,13 @@ class ResumingTest(absltest.TestCase):
 
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
-    self._run(self._folder / "whole")
-    self._whole = self._numbers(self._folder / "whole")
+    self._run(self.folder / "whole")
+    self._whole = self._numbers(self.folder / "whole")
 
   def test_killed_at_random_moments(self):
     random = np.random.default_rng(0)
     for number in range(5):
-      path = self._folder / f"killed{number}"
+      path = self.folder / f"killed{number}"
       with self.assertRaises(_Killed):
         self._run(path, die_at=int(random.integers(1, 400)))
       for _ in range(2):  # may be killed again on its way
@@ -137,7 +130,7 @@ class ResumingTest(absltest.TestCase):
       self.assertEqual(self._numbers(path), self._whole)
 
   def test_killed_inside_a_checkpoint(self):
-    path = self._folder / "killed"
+    path = self.folder / "killed"
     save, calls = checkpoints._write, []
 
     def half(aside, state):
@@ -156,18 +149,14 @@ class ResumingTest(absltest.TestCase):
     self.assertEqual(self._numbers(path), self._whole)
 
   def test_a_damaged_newest_checkpoint_falls_back(self):
-    path = self._folder / "killed"
-    with self.assertRaises(_Killed):
-      self._run(path, die_at=250)
+    path = self._killed(250)
     newest = checkpoints.every(path / "checkpoints")[-1]
     (newest / "state.json").write_text("{}")
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
 
   def test_a_run_of_damaged_checkpoints_alone_is_left_as_it_is(self):
-    path = self._folder / "killed"
-    with self.assertRaises(_Killed):
-      self._run(path, die_at=250)
+    path = self._killed(250)
     for checkpoint in checkpoints.every(path / "checkpoints"):
       (checkpoint / "state.json").write_text("{}")
     before = self._numbers(path)
@@ -176,9 +165,7 @@ class ResumingTest(absltest.TestCase):
     self.assertEqual(self._numbers(path), before)
 
   def test_without_its_replay_a_run_refills_it(self):
-    path = self._folder / "killed"
-    with self.assertRaises(_Killed):
-      self._run(path, die_at=250)
+    path = self._killed(250)
     shutil.rmtree(path / "replay")
     with self.assertLogs(level="WARNING") as logs:
       self._run(path, resume=True)
@@ -188,15 +175,13 @@ class ResumingTest(absltest.TestCase):
     self.assertLess(int(rows[-1]["update"]), int(self._whole[0][-1]["update"]))
 
   def test_killed_before_the_first_checkpoint(self):
-    path = self._folder / "killed"
-    with self.assertRaises(_Killed):
-      self._run(path, die_at=50)
+    path = self._killed(50)
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
 
   def test_a_finished_run_resumes_to_nothing(self):
-    self._run(self._folder / "whole", resume=True)
-    self.assertEqual(self._numbers(self._folder / "whole"), self._whole)
+    self._run(self.folder / "whole", resume=True)
+    self.assertEqual(self._numbers(self.folder / "whole"), self._whole)
 
 
 if __name__ == "__main__":

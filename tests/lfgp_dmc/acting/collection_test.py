@@ -8,7 +8,7 @@ from absl.testing import absltest, parameterized
 import lfgp_dmc
 from lfgp_dmc import toy
 from lfgp_dmc.acting import collection
-from lfgp_dmc.acting.attempts import Collector, Plan
+from lfgp_dmc.acting.attempts import CollectionPlan, Collector
 from lfgp_dmc.tasks import experts
 
 
@@ -51,7 +51,7 @@ def _plan(make_actor=toy.WalkingActor, **options):
     "play_steps": 20,
     **options,
   }
-  return Plan(**options)
+  return CollectionPlan(**options)
 
 
 def _collect(plan, kind="reset", tasks=toy.TASKS, pairs=50):
@@ -80,7 +80,7 @@ class CollectTest(parameterized.TestCase):
       )
 
   def test_of_several_attempts_the_longest_is_kept(self):
-    one, three = Collector(_plan()), Collector(_plan(longest_of=3))
+    one, three = Collector(_plan()), Collector(_plan(keep_longest_of=3))
     _, every = one(("right", range(30)))
     _, kept = three(("right", range(10)))
     lengths = [len(attempt.rows.action) for attempt in every]
@@ -89,7 +89,7 @@ class CollectTest(parameterized.TestCase):
       [len(attempt.rows.action) for attempt in kept],
       [max(lengths[i : i + 3]) for i in range(0, 30, 3)],
     )
-    failing = Collector(_plan(_RightOnly, longest_of=2))
+    failing = Collector(_plan(_RightOnly, keep_longest_of=2))
     _, (failed,) = failing(("left", [0]))
     self.assertIsNone(failed.rows)
 
@@ -162,9 +162,9 @@ class CollectTest(parameterized.TestCase):
 
   @parameterized.parameters("reset", "play")
   def test_workers_change_nothing(self, kind):
-    plan = Plan(
+    plan = CollectionPlan(
       lfgp_dmc.load,
-      experts.make_expert,
+      experts.ScriptedExpert,
       "stack",
       lfgp_dmc.task_set("stack"),
       seed=1,

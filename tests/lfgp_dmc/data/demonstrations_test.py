@@ -9,31 +9,10 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.data import demonstrations
-from lfgp_dmc.data.demonstrations import DatasetError, Demonstrations
+from lfgp_dmc.data.demonstrations import DatasetError
+from tests import fixtures
 
-_ATTRIBUTES = {
-  "task": "reach",
-  "main_task": "stack",
-  "collection": "reset",
-  "expert": "scripted",
-  "seed": 0,
-  "control_hz": 20,
-}
-
-
-def _demonstrations(pairs: int = 6) -> Demonstrations:
-  random = np.random.default_rng(0)
-  observation = random.normal(size=(pairs + 1, 5)).astype(np.float32)
-  is_last = np.zeros(pairs, bool)
-  is_last[pairs // 2 - 1] = True
-  return Demonstrations(
-    observation[:-1],
-    random.uniform(-1, 1, (pairs, 2)).astype(np.float32),
-    observation[1:],
-    (np.arange(pairs) >= pairs // 2).astype(np.int32),
-    is_last,
-  )
-
+_DATA = fixtures.demonstrations(3, 3)
 
 # A fault of the arrays: what replaces which array, and what is said of it.
 _FAULTS = {
@@ -59,16 +38,15 @@ _BAD_ATTRIBUTES = {
 }
 
 
-class DemonstrationsTest(parameterized.TestCase):
+class DemonstrationsTest(fixtures.FolderTest):
   def setUp(self):
     super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
-    self._path = self._folder / "reach.hdf5"
+    self._path = self.folder / "reach.hdf5"
 
   def _write(self, task: str = "reach") -> pathlib.Path:
-    path = self._folder / f"{task}.hdf5"
-    attributes = {**_ATTRIBUTES, "task": task}
-    demonstrations.write(path, _demonstrations(), attributes)
+    path = self.folder / f"{task}.hdf5"
+    attributes = {**fixtures.ATTRIBUTES, "task": task}
+    demonstrations.write(path, _DATA, attributes)
     return path
 
   def _replace(self, name: str, array: np.ndarray) -> None:
@@ -78,7 +56,7 @@ class DemonstrationsTest(parameterized.TestCase):
 
   def _read_error(self) -> str:
     with self.assertRaises(DatasetError) as caught:
-      demonstrations.read_folder(self._folder, ("reach",), 5, 2)
+      demonstrations.read_folder(self.folder, ("reach",), 5, 2)
     lines = str(caught.exception).splitlines()
     self.assertLen(lines, 2)
     self.assertStartsWith(lines[1], str(self._path))
@@ -87,11 +65,11 @@ class DemonstrationsTest(parameterized.TestCase):
   def test_round_trip(self):
     self._write()
     read = demonstrations.read(self._path, "reach", 5, 2)
-    for name, array in _demonstrations().arrays().items():
+    for name, array in _DATA.arrays().items():
       np.testing.assert_array_equal(getattr(read, name), array)
       self.assertEqual(getattr(read, name).dtype, array.dtype)
     self.assertEqual(
-      dict(read.attributes), {**_ATTRIBUTES, "schema_version": 1}
+      dict(read.attributes), {**fixtures.ATTRIBUTES, "schema_version": 1}
     )
     self.assertLen(read.head(4), 4)
 
@@ -108,29 +86,27 @@ class DemonstrationsTest(parameterized.TestCase):
     )
     with interrupt, self.assertRaises(KeyboardInterrupt):
       self._write()
-    self.assertEmpty(list(self._folder.iterdir()))
+    self.assertEmpty(list(self.folder.iterdir()))
 
   def test_nothing_is_overwritten(self):
     self._write()
     with self.assertRaises(FileExistsError):
       self._write()
     with self.assertRaisesRegex(FileExistsError, "never written into"):
-      demonstrations.create_folder(self._folder)
-    new = demonstrations.create_folder(self._folder / "a" / "b")
+      demonstrations.create_folder(self.folder)
+    new = demonstrations.create_folder(self.folder / "a" / "b")
     self.assertTrue(new.is_dir())
 
   def test_bad_data_are_not_written(self):
-    bad = dataclasses.replace(
-      _demonstrations(), action=np.full((6, 2), 2, np.float32)
-    )
+    bad = dataclasses.replace(_DATA, action=np.full((6, 2), 2, np.float32))
     with self.assertRaisesRegex(DatasetError, "not written: 'action'"):
-      demonstrations.write(self._path, bad, _ATTRIBUTES)
+      demonstrations.write(self._path, bad, fixtures.ATTRIBUTES)
     self.assertFalse(self._path.exists())
 
   @parameterized.named_parameters((k, *v) for k, v in _FAULTS.items())
   def test_fault_of_an_array(self, name, change, message):
     self._write()
-    self._replace(name, change(getattr(_demonstrations(), name)))
+    self._replace(name, change(getattr(_DATA, name)))
     self.assertRegex(self._read_error(), message)
 
   @parameterized.named_parameters(
@@ -168,11 +144,11 @@ class DemonstrationsTest(parameterized.TestCase):
   def test_every_fault_of_the_folder_damaged_first(self):
     for task in ("reach", "lift", "stack"):
       self._write(task)
-    (self._folder / "lift.hdf5").write_bytes(b"no")
+    (self.folder / "lift.hdf5").write_bytes(b"no")
     self._replace("is_last", np.zeros(2, bool))
     tasks = ("move_object", "stack", "reach", "lift", "bring")
     with self.assertRaises(DatasetError) as caught:
-      demonstrations.read_folder(self._folder, tasks, 5, 2)
+      demonstrations.read_folder(self.folder, tasks, 5, 2)
     lines = str(caught.exception).splitlines()[1:]
     order = [line.partition(": ")[0].rpartition("/")[2] for line in lines]
     self.assertEqual(
@@ -182,10 +158,10 @@ class DemonstrationsTest(parameterized.TestCase):
 
   def test_no_folder(self):
     with self.assertRaisesRegex(DatasetError, "no dataset folder.*reach.hdf5"):
-      demonstrations.read_folder(self._folder / "none", ("reach",))
+      demonstrations.read_folder(self.folder / "none", ("reach",))
 
   def test_summary(self):
-    table = demonstrations.summary_table({"reach": _demonstrations()})
+    table = demonstrations.summary_table({"reach": _DATA})
     header, row = table.splitlines()
     self.assertIn("episodes", header)
     self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])

@@ -1,0 +1,170 @@
+"""The parts of a run, made once from its config."""
+
+import functools
+import os
+import pathlib
+from typing import NamedTuple
+
+import dm_env
+import torch
+
+from lfgp_dmc import seeding, task_names
+from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch import command, datasets, environment_spec, policies
+from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
+from lfgp_dmc.runs.run import Run
+from lfgp_dmc.runs.run_folder import RunFolder
+from lfgp_dmc.runs.schedule import TrainSchedule
+from lfgp_dmc.types import ActingAgent, SupervisedAgent
+
+_DETERMINISTIC_CUBLAS = ":4096:8"
+
+
+class Parts(NamedTuple):
+  """What an agent is built from."""
+
+  environment: dm_env.Environment
+  tasks: tuple[str, ...]  # that are learned, the main task first
+  widths: tuple[int, int]  # (O, A)
+  demonstrations: dict[str, Demonstrations]
+  device: torch.device
+
+
+def make_parts(config: RunConfig) -> Parts:
+  """Sets torch up, builds the environment, reads the demonstrations.
+
+  Raises:
+    UserError: there is no such device, environment or dataset.
+  """
+  device = _set_up_torch(config)
+  with command.checked_input():
+    environment = config.world.build(config.keeps_rewards)
+    tasks = tasks_of(config, environment)
+    widths = environments.widths(environment)
+  demonstrations = datasets.load(config, tasks, widths)
+  return Parts(environment, tasks, widths, demonstrations, device)
+
+
+def tasks_of(
+  config: RunConfig, environment: dm_env.Environment
+) -> tuple[str, ...]:
+  """The tasks that are learned, the main task first."""
+  if not ALGORITHMS[config.algorithm].is_multitask:
+    return (config.main_task,)
+  if config.environment:
+    return environment_spec.tasks_of(environment, config.main_task)
+  return task_names.task_set(config.main_task)
+
+
+def make_replay(
+  config: RunConfig, parts: Parts, folder: pathlib.Path | None = None
+) -> Replay:
+  """An empty replay, or the one that the folder holds."""
+  reward_tasks: tuple[str, ...] = ()
+  if config.keeps_rewards:  # all that are observed, for transfers
+    reward_tasks = environments.tasks_with_rewards(
+      parts.environment, parts.tasks
+    )
+  # A full ring must still hold the rows of the last checkpoint.
+  episode = getattr(config.agent, "episode_steps", 0)
+  is_ring = config.replay_capacity < config.env_steps or config.transfer_from
+  return Replay(
+    config.replay_capacity if folder else 1,
+    *parts.widths,
+    folder,
+    slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+    reward_tasks=reward_tasks,
+  )
+
+
+def make_agent(
+  config: RunConfig, parts: Parts, replay: Replay | None
+) -> ActingAgent | SupervisedAgent:
+  """The config's agent.
+
+  Raises:
+    ValueError: the parts do not fit it.
+  """
+  return ALGORITHMS[config.algorithm].build(
+    config.agent,
+    parts.tasks,
+    parts.demonstrations,
+    replay,
+    seeding.derive(config.seed, "agent"),
+    parts.device,
+    *parts.widths,
+  )
+
+
+def make_run(
+  config: RunConfig, parts: Parts, folder: RunFolder, progress_bar: bool
+) -> Run:
+  """The run in its folder.
+
+  Raises:
+    ValueError: the parts do not fit the agent, or the replay is damaged.
+  """
+  is_supervised = ALGORITHMS[config.algorithm].is_supervised
+  replay = None if is_supervised else make_replay(config, parts, folder.replay)
+  evaluate = functools.partial(
+    evaluation.evaluate,
+    config.world.factory(show_rewards=True),
+    functools.partial(policies.stored_policy, os.fspath(folder.path)),
+    parts.tasks,
+    config.evaluation_episodes,
+    config.evaluation_seed,
+    config.evaluation_workers or command.cores(),
+    progress_bar,
+  )
+  return Run(
+    folder,
+    make_agent(config, parts, replay),
+    parts.environment,
+    replay,
+    _schedule(config, progress_bar),
+    evaluate,
+    config.to_dict(),
+    seeding.derive(config.seed, "environment"),
+  )
+
+
+def _schedule(config: RunConfig, progress_bar: bool) -> TrainSchedule:
+  pace = {}
+  if not ALGORITHMS[config.algorithm].is_supervised:
+    pace["warmup_steps"] = config.agent.warm_up
+    if config.transfer_from:  # there is a replay from the start
+      pace["warmup_steps"] = min(config.agent.warm_up, config.agent.batch_size)
+    pace["updates_per_step"] = config.agent.updates_per_step
+  return TrainSchedule(
+    env_steps=config.env_steps,
+    log_every=config.log_every,
+    evaluate_every=config.evaluate_every,
+    checkpoint_every=config.checkpoint_every,
+    evaluate_first=config.evaluate_first,
+    progress_bar=progress_bar,
+    **pace,
+  )
+
+
+def _set_up_torch(config: RunConfig) -> torch.device:
+  """Sets threads and determinism; returns the device."""
+  torch.set_num_threads(config.threads or command.cores())
+  if config.deterministic:
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", _DETERMINISTIC_CUBLAS)
+    torch.use_deterministic_algorithms(True)
+  name = config.device
+  if name == "auto":
+    name = "cuda" if torch.cuda.is_available() else "cpu"
+  try:
+    device = torch.device(name)
+    torch.zeros(1, device=device)
+  except (RuntimeError, AssertionError, NotImplementedError) as error:
+    reason = str(error).partition("\n")[0]
+    raise UserError(
+      f"config.device is {config.device!r}: {reason}; valid: auto, cpu, or "
+      "cuda where this build of torch finds one"
+    ) from None
+  return device

@@ -1,0 +1,134 @@
+"""What all training loops share: rounds, with rows and files between them."""
+
+import abc
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Generic, TypeVar
+
+import tqdm
+
+from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from lfgp_dmc.runs.signals import stop_request
+from lfgp_dmc.types import Agent, Metrics
+
+EvaluateFn = Callable[[int], Mapping[str, float]]
+CheckpointFn = Callable[[Progress], object]
+_Agent = TypeVar("_Agent", bound=Agent)
+
+
+class Rounds(abc.ABC, Generic[_Agent]):
+  """Trains by rounds, an episode or an epoch each, until the run's end.
+
+  Evaluations and checkpoints fall on ends of rounds. SIGINT or SIGTERM finishes
+  the round and writes a checkpoint, without rows or an evaluation that were not
+  due, so that the resumed run equals one never stopped.
+  """
+
+  _unit = "step"  # of the progress bar
+
+  def __init__(
+    self,
+    agent: _Agent,
+    schedule: TrainSchedule,
+    log: MetricsLog,
+    progress: Progress | None,
+  ):
+    """Starts the clock.
+
+    Args:
+      agent: learns.
+      schedule: when things happen.
+      log: gets a row each `log_every` steps and a last one.
+      progress: of the checkpoint that is being resumed.
+    """
+    self.progress = progress or Progress()
+    self._agent = agent
+    self._schedule = schedule
+    self._log = log
+    self._start = time.monotonic() - self.progress.wall_s
+    self._mark = self._counts()  # of the last row
+
+  def run(
+    self, evaluate_fn: EvaluateFn | None, checkpoint_fn: CheckpointFn | None
+  ) -> Progress:
+    """Trains to the end, or to a signal.
+
+    Args:
+      evaluate_fn: env_step -> success rate by task; writes its own rows.
+      checkpoint_fn: stores the agent, its data and the progress it is given.
+
+    Returns:
+      The progress; `is_complete` tells whether it was stopped.
+    """
+    schedule, progress = self._schedule, self.progress
+    progress.is_complete |= progress.env_step >= schedule.env_steps
+    self._bar = tqdm.tqdm(
+      total=schedule.env_steps,
+      initial=progress.env_step,
+      unit=self._unit,
+      disable=not schedule.progress_bar,
+      mininterval=1.0,
+    )
+    with self._bar, stop_request() as stop:
+      self._begin()
+      if schedule.evaluate_first and evaluate_fn and not progress.env_step:
+        self._evaluate(evaluate_fn)
+      while not progress.is_complete and not stop:
+        before = progress.env_step
+        self._round()
+        step, final = progress.env_step, progress.is_complete
+        due = final or passed(before, step, schedule.evaluate_every)
+        if due and evaluate_fn:
+          self._evaluate(evaluate_fn)
+        due = final or passed(before, step, schedule.checkpoint_every)
+        if (due or stop) and checkpoint_fn:
+          progress.wall_s = self._elapsed()
+          checkpoint_fn(progress)
+    return progress
+
+  def _begin(self) -> None:
+    """Work before the first round, if any."""
+
+  @abc.abstractmethod
+  def _round(self) -> None:
+    """Makes a round: counts, writes rows that are due, notes the run's end."""
+
+  def _rates(self, seconds: float, steps: int, updates: int) -> dict[str, Any]:
+    """Columns of a row between `wall_s` and the agent's own metrics."""
+    del steps
+    return {"updates_per_s": round(updates / seconds, 3)}
+
+  def _write_row(self) -> Metrics:
+    """Writes what happened since the last row; returns the agent's metrics."""
+    progress, before = self.progress, self._mark
+    self._mark = now = self._counts()
+    seconds, steps, updates = (a - b for a, b in zip(now, before, strict=True))
+    metrics = self._agent.metrics()
+    row = {
+      "env_step": progress.env_step,
+      "update": progress.update,
+      "wall_s": round(now[0], 3),
+    }
+    row |= self._rates(max(seconds, 1e-9), int(steps), int(updates))
+    self._log.write({**row, **metrics})
+    return metrics
+
+  def _evaluate(self, evaluate_fn: EvaluateFn) -> None:
+    rates = evaluate_fn(self.progress.env_step)
+    self._log.write_scalars(
+      self.progress.env_step,
+      {f"success/{task}": rate for task, rate in rates.items()},
+    )
+    self._bar.set_postfix({k: f"{rate:.0%}" for k, rate in rates.items()})
+
+  def _counts(self) -> tuple[float, int, int]:
+    return self._elapsed(), self.progress.env_step, self.progress.update
+
+  def _elapsed(self) -> float:
+    return time.monotonic() - self._start
+
+
+def passed(before: int, now: int, every: int) -> bool:
+  """Whether a multiple of `every` lies in (before, now]."""
+  return before // every != now // every

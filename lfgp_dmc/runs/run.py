@@ -1,0 +1,170 @@
+"""A whole run: trained, evaluated, stored, and brought back.
+
+The replay reaches the disk before the checkpoint that counts its rows, so a
+kill between the two leaves a replay that is ahead, and it is rewound.
+"""
+
+import dataclasses
+import pathlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import dm_env
+import safetensors.numpy
+from absl import logging
+
+from lfgp_dmc.data import csv_files, evaluation_csv, files
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import checkpoints, loop, run_folder, supervised
+from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.run_folder import RunFolder
+from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from lfgp_dmc.types import ActingAgent, Agent, SupervisedAgent
+
+
+class Run:
+  """The parts of one run, put together."""
+
+  def __init__(
+    self,
+    folder: RunFolder,
+    agent: ActingAgent | SupervisedAgent,
+    environment: dm_env.Environment,
+    replay: Replay | None,
+    schedule: TrainSchedule,
+    evaluate: Callable[[int], Sequence[evaluation_csv.EvaluationRow]],
+    config: Mapping[str, Any],
+    seed: int = 0,
+  ):
+    """Opens the log.
+
+    Args:
+      folder: the run's, locked.
+      agent: freshly built.
+      environment: where an acting agent acts.
+      replay: what it learns from; None for a supervised one.
+      schedule: when things happen.
+      evaluate: env_step -> episodes of the policy that the folder holds.
+      config: what `config.json` keeps, JSON-able.
+      seed: of the episodes' starts.
+    """
+    self.agent, self.replay = agent, replay
+    self._folder = folder
+    self._environment = environment
+    self._schedule = schedule
+    self._evaluate_policy = evaluate
+    self._config = config
+    self._seed = seed
+    self._log = MetricsLog(folder.path)
+    self._progress = Progress()
+
+  def train(self) -> Progress:
+    """Trains to the end or to a signal; see `loop.train`."""
+    self._save_policy(self._progress.env_step)
+    try:
+      if isinstance(self.agent, SupervisedAgent):
+        return supervised.train(
+          self.agent,
+          self._schedule,
+          self._log,
+          self._evaluate,
+          self._checkpoint,
+          progress=self._progress,
+        )
+      assert self.replay is not None, "an acting agent has a replay"
+      return loop.train(
+        self._environment,
+        self.agent,
+        self.replay,
+        self._schedule,
+        self._log,
+        self._evaluate,
+        self._checkpoint,
+        seed=self._seed,
+        progress=self._progress,
+      )
+    finally:
+      self._log.close()
+      self._environment.close()
+
+  def restore(self) -> bool:
+    """Goes back to the newest good checkpoint, or to the start without one.
+
+    The CSV files are cut back to it. A replay that lost the checkpoint's rows
+    is emptied, with a warning, and the loop refills it before it updates again.
+
+    Returns:
+      Whether there was one.
+
+    Raises:
+      CheckpointError: there are checkpoints, all damaged; nothing was changed.
+    """
+    folder = self._folder
+    path = checkpoints.latest(folder.checkpoints)
+    if path is None and checkpoints.every(folder.checkpoints):
+      raise checkpoints.CheckpointError(
+        f"every checkpoint in {folder.checkpoints} is damaged; without that "
+        "folder --resume starts the run anew"
+      )
+    replay_total, last_step = 0, -1
+    if path is None:
+      logging.warning("%s has no checkpoint yet: starting anew", folder.path)
+    else:
+      state = checkpoints.load(path)
+      self.agent.load_state_dict(state["agent"])
+      self._progress = Progress(**state["progress"])
+      replay_total, last_step = state["replay_total"], self._progress.env_step
+      logging.info("resuming from %s", path)
+    if self.replay is not None:
+      _rewind(self.replay, replay_total)
+    self._log.truncate_after(last_step)
+    csv_files.truncate_after(folder.evaluation, last_step)
+    return path is not None
+
+  def _evaluate(self, env_step: int) -> dict[str, float]:
+    self._save_policy(env_step)
+    rows = self._evaluate_policy(env_step)
+    evaluation_csv.append_csv(self._folder.evaluation, rows)
+    return evaluation_csv.success_rates(rows)
+
+  def _checkpoint(self, progress: Progress) -> None:
+    """Stores everything; a failed write leaves earlier checkpoints as is."""
+    self._save_policy(progress.env_step)
+    if self.replay is not None:
+      self.replay.flush()
+    state = {
+      "agent": self.agent.state_dict(),
+      "progress": dataclasses.asdict(progress),
+      "replay_total": 0 if self.replay is None else self.replay.total,
+    }
+    checkpoints.save(
+      self._folder.checkpoints,
+      progress.env_step,
+      state,
+      self._schedule.env_steps,
+    )
+
+  def _save_policy(self, env_step: int) -> None:
+    save_policy(self._folder.path, self.agent, self._config, env_step)
+
+
+def save_policy(
+  folder: files.Path, agent: Agent, config: Mapping[str, Any], env_step: int
+) -> None:
+  """Makes a folder the policy folder of the agent's present policy."""
+  folder = pathlib.Path(folder)
+  with files.replacing(folder / run_folder.ARRAYS_NAME) as aside:
+    safetensors.numpy.save_file(agent.policy_arrays(), aside)
+  options = {**agent.policy_options(), "env_step": env_step}
+  files.write_json(
+    folder / run_folder.CONFIG_NAME,
+    {**config, run_folder.POLICY_FIELD: options},
+  )
+
+
+def _rewind(replay: Replay, total: int) -> None:
+  try:
+    replay.rewind(total)
+  except ValueError as error:
+    logging.warning("%s; refilling the replay before further updates", error)
+    replay.clear()

@@ -1,0 +1,70 @@
+"""The observables of the play task: read from what it publishes once a step."""
+
+import functools
+from collections.abc import Callable, Iterable, Mapping
+
+import numpy as np
+from dm_control.composer.observation import observable
+
+from lfgp_dmc.observations import (
+  CONDITION_PREFIX,
+  OBSERVATION_SLICES,
+  REWARD_PREFIX,
+  SUCCESS_PREFIX,
+)
+from lfgp_dmc.tasks.arena import FRONT_CAMERA, PlayArena
+from lfgp_dmc.tasks.goals import GOALS
+
+_CAMERA = "camera/" + FRONT_CAMERA
+_FLAGS = [p + n for p in (SUCCESS_PREFIX, CONDITION_PREFIX) for n in GOALS]
+_VALUES = (np.array(False), np.array(True))
+for _value in _VALUES:
+  _value.setflags(write=False)  # handed out without a copy
+
+
+def make(
+  published: Mapping[str, np.ndarray],
+  read_reward: Callable[..., np.ndarray],
+  arena: PlayArena,
+  has_camera: bool,
+  show_rewards: bool,
+) -> dict[str, observable.Observable]:
+  """Makes all observables; those that were not chosen are disabled.
+
+  Args:
+    published: components and flags by name.
+    read_reward: (task, physics) -> its dense reward, float [].
+    arena: has the camera.
+    has_camera: whether the camera is observed in place of privileged parts.
+    show_rewards: whether every goal's dense reward is observed.
+  """
+  made: dict[str, observable.Observable] = {}
+
+  def add(name: str, value: observable.Observable, is_enabled: bool) -> None:
+    value.enabled = is_enabled
+    made[name] = value
+
+  for name, component in OBSERVATION_SLICES.items():
+    is_hidden = has_camera and component.privileged
+    add(name, _published(published, name), not is_hidden)
+  for name in _FLAGS:
+    add(name, _published(published, name), True)
+  for name in GOALS:
+    reward = observable.Generic(functools.partial(read_reward, name))
+    add(REWARD_PREFIX + name, reward, show_rewards)
+  camera = arena.mjcf_model.find("camera", FRONT_CAMERA)
+  pictures = observable.MJCFCamera(camera, height=84, width=84)
+  add(_CAMERA, pictures, has_camera)
+  return made
+
+
+def _published(published, name: str) -> observable.Observable:
+  return observable.Generic(lambda physics: published[name])
+
+
+def flags(
+  successes: Iterable[bool], conditions: Iterable[bool]
+) -> dict[str, np.ndarray]:
+  """Values of the flags by name; one of each a goal, in their order."""
+  values = map(_VALUES.__getitem__, (*successes, *conditions))
+  return dict(zip(_FLAGS, values, strict=True))

@@ -1,0 +1,84 @@
+"""What many tests share: a folder of their own, demonstrations, a toy agent."""
+
+import pathlib
+
+import numpy as np
+from absl.testing import parameterized
+
+from lfgp_dmc import toy
+from lfgp_dmc.data.demonstrations import Demonstrations
+
+ATTRIBUTES = {
+  "task": "reach",
+  "main_task": "stack",
+  "collection": "reset",
+  "expert": "scripted",
+  "seed": 0,
+  "control_hz": 20,
+}
+
+
+class FolderTest(parameterized.TestCase):
+  """A test with an empty folder."""
+
+  def setUp(self):
+    super().setUp()
+    self.folder = pathlib.Path(self.create_tempdir().full_path)
+
+
+def demonstrations(*lengths: int) -> Demonstrations:
+  """Attempts of these lengths, 5 and 2 floats; the last one is cut."""
+  random, total = np.random.default_rng(0), sum(lengths)
+  episode = np.repeat(np.arange(len(lengths)), lengths).astype(np.int32)
+  states = random.normal(size=(total + 1, 5)).astype(np.float32)
+  is_last = np.append(np.diff(episode) > 0, False)
+  observation, after = states[:-1].copy(), states[1:].copy()
+  after[is_last] += 1
+  return Demonstrations(
+    observation,
+    random.uniform(-1, 1, (total, 2)).astype(np.float32),
+    after,
+    episode,
+    is_last,
+    ATTRIBUTES,
+  )
+
+
+class ToyAgent:
+  """An acting agent of the toy world that acts at random and learns nothing."""
+
+  tasks = toy.TASKS
+
+  def __init__(self):
+    self.random = np.random.default_rng(3)
+    self.updates = 0
+
+  def prepare(self, progress_bar):
+    pass
+
+  def begin_episode(self):
+    pass
+
+  def act(self, observation):
+    return self.random.uniform(-0.5, 0.5, 2).astype(np.float32)
+
+  def end_episode(self, episode):
+    pass
+
+  def update(self):
+    self.updates += 1
+
+  def metrics(self):
+    return {"loss/critic": float(self.updates)}
+
+  def policy_arrays(self):
+    return {"weights": np.zeros(2, np.float32)}
+
+  def policy_options(self):
+    return {"tasks": list(self.tasks)}
+
+  def state_dict(self):
+    return {}
+
+  def load_state_dict(self, state):
+    pass
