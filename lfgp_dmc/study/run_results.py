@@ -14,7 +14,7 @@ from lfgp_dmc.runs import run_folder
 
 SUCCESS, RETURN = "success", "return"
 QUANTITIES = (SUCCESS, RETURN)
-# Their last evaluation is their result.
+# Cloning takes no environment steps: its last evaluation is its result.
 WITHOUT_STEPS = ("bc", "bc_less", "multitask_bc")
 
 
