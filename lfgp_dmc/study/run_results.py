@@ -1,7 +1,6 @@
 """Runs of a study, read from their `config.json` and `evaluation.csv` alone."""
 
 import glob
-import os
 import pathlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -130,14 +129,14 @@ def _points(run: Run, task: str, quantity: str) -> dict[int, float]:
 
 
 def _expanded(patterns: Sequence[files.Path]) -> list[pathlib.Path]:
-  """Runs themselves, and the runs inside folders that are none."""
-  found: dict[pathlib.Path, None] = {}
-  for pattern in map(str, patterns):
-    matches = [m for m in sorted(glob.glob(pattern)) if os.path.isdir(m)]
-    for folder in map(pathlib.Path, matches or [pattern]):
-      inside = sorted(folder.glob(f"*/{run_folder.CONFIG_NAME}"))
-      if (folder / run_folder.CONFIG_NAME).is_file() or not inside:
-        found[folder] = None
-      else:
-        found |= dict.fromkeys(path.parent for path in inside)
-  return list(found)
+  """Runs that match, and those in folders that do; else the pattern itself."""
+  found: list[pathlib.Path] = []
+  for pattern in patterns:
+    configs = [
+      config
+      for depth in ("", "*/")
+      for config in glob.glob(f"{pattern}/{depth}{run_folder.CONFIG_NAME}")
+    ]
+    runs = [pathlib.Path(config).parent for config in sorted(configs)]
+    found += runs or [pathlib.Path(pattern)]
+  return list(dict.fromkeys(found))

@@ -17,10 +17,10 @@ from lfgp_dmc import graphics
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import clips, command, policies, view
 from lfgp_dmc.pictures.recorder import Look
+from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 _POLICY = str(_ROOT / "results" / "policies" / "stack")
-_SMALL = "--height=64 --width=96 --noshadows"
 
 
 class PolicyTest(absltest.TestCase):
@@ -68,14 +68,8 @@ class RenderingTest(absltest.TestCase):
     self.folder = pathlib.Path(self.create_tempdir().full_path)
 
   def _render(self, line: str) -> subprocess.CompletedProcess:
-    script = _ROOT / "launch" / "render_policy.py"
-    return subprocess.run(
-      [sys.executable, script, *_SMALL.split(), *line.split()],
-      cwd=self.folder,
-      capture_output=True,
-      text=True,
-      check=False,
-    )
+    small = "--height=64 --width=96 --noshadows"
+    return fixtures.call(f"render_policy.py {small} {line}", self.folder)
 
   def _rendered(self, line: str, name: str):
     """The picture or frames, and what the sidecar says."""
