@@ -1,54 +1,17 @@
 """All tasks' demonstrations in one pool on the device, sampled at once."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
 
-
-class DemonstrationArrays(Protocol):
-  """One task's demonstrations as arrays of N rows."""
-
-  @property
-  def observation(self) -> np.ndarray:
-    """float32 [N, O]."""
-
-  @property
-  def action(self) -> np.ndarray:
-    """float32 [N, A]."""
-
-  @property
-  def next_observation(self) -> np.ndarray:
-    """float32 [N, O]."""
-
-  @property
-  def is_last(self) -> np.ndarray:
-    """Rows of success, bool [N]."""
-
-
-class ExpertBatch(NamedTuple):
-  """Each task's own expert rows."""
-
-  inputs: torch.Tensor  # [K, N, O], standardised
-  action: torch.Tensor  # [K, N, A]
-
-
-class Batch(NamedTuple):
-  """Transitions shared by all tasks, but for examples of success."""
-
-  inputs: torch.Tensor  # [B, O], standardised
-  action: torch.Tensor  # [B, A]; of examples: unused
-  next_inputs: torch.Tensor  # [B, O], standardised
-  reward: torch.Tensor | None = None  # [K, B], where it was stored (SAC-X)
-  # int64 [B], where there are examples of success: the task that a row is an
-  # example of, or -1 for a transition of the replay.
-  owner: torch.Tensor | None = None
-  examples: int = 0  # how many of the last rows are examples
+from lfgp_dmc.agents.batches import Batch, ExpertBatch
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.data.demonstrations import Demonstrations
 
 
 def pooled_observations(
-  demonstrations: Mapping[str, DemonstrationArrays], tasks: Sequence[str]
+  demonstrations: Mapping[str, Demonstrations], tasks: Sequence[str]
 ) -> np.ndarray:
   """All tasks' observations, [sum of N, O].
 
@@ -66,7 +29,7 @@ def pooled_observations(
 
 
 def check_sizes(
-  demonstrations: Mapping[str, DemonstrationArrays],
+  demonstrations: Mapping[str, Demonstrations],
   tasks: Sequence[str],
   observation_size: int,
   action_size: int,
@@ -89,24 +52,23 @@ class ExpertPool:
 
   def __init__(
     self,
-    demonstrations: Mapping[str, DemonstrationArrays],
+    demonstrations: Mapping[str, Demonstrations],
     tasks: Sequence[str],
-    standardise: Callable[[torch.Tensor], torch.Tensor],
-    device: torch.device | str = "cpu",
+    standardiser: Standardiser,
   ):
-    """Copies the demonstrations to the device, standardised.
+    """Copies the demonstrations to the standardiser's device.
 
     Args:
-      demonstrations: task -> arrays.
+      demonstrations: by task.
       tasks: the K tasks, in the order of every K axis; main first.
-      standardise: raw observations [N, O] -> network inputs.
-      device: where to keep them.
+      standardiser: raw observations -> network inputs.
 
     Raises:
       ValueError: a task has no demonstrations.
     """
     observation = pooled_observations(demonstrations, tasks)
     parts = [demonstrations[task] for task in tasks]
+    device = standardiser.mean.device
 
     def put(array: np.ndarray) -> torch.Tensor:
       return torch.from_numpy(np.asarray(array, np.float32)).to(device)
@@ -116,7 +78,7 @@ class ExpertPool:
     self._next_observation = put(
       np.concatenate([part.next_observation for part in parts])
     )
-    self._standardise = standardise
+    self._standardiser = standardiser
     self._device = device
     self._tasks = tuple(tasks)
     self._sizes = np.array([len(part.action) for part in parts])
@@ -134,9 +96,9 @@ class ExpertPool:
 
   def refresh(self) -> None:
     """Standardises all rows anew, after the standardiser has changed."""
-    self._inputs = self._standardise(self._observation)
-    self._next_inputs = self._standardise(self._next_observation)
-    self._deviations = torch.stack(
+    self._inputs = self._standardiser(self._observation)
+    self._next_inputs = self._standardiser(self._next_observation)
+    self.next_stds = torch.stack(
       [
         self._next_inputs[start : start + size].std(0, correction=0)
         for start, size in zip(self._offsets, self._sizes, strict=True)
@@ -195,44 +157,26 @@ class ExpertPool:
     Returns:
       [n, ...] tensors.
     """
-    task = self._split(rows)
+    task = self.split(rows)
     index = self._offsets[task] + generator.integers(self._sizes[task])
     at = torch.from_numpy(index).to(self._device)
     return Batch(self._inputs[at], self._action[at], self._next_inputs[at])
 
-  def sample_examples(
-    self, generator: np.random.Generator, rows: int, noise: float
-  ) -> Batch:
-    """Draws states of success, split as `sample_transitions` splits.
-
-    Each is what a row of success led to. An example stands for staying where
-    it is: its next state is itself, with noise of its own.
-
-    Args:
-      generator: source of indices and noise.
-      rows: n, examples in all.
-      noise: standard deviation, in those of the task's own demonstrations.
+  def sample_finals(
+    self, generator: np.random.Generator, task: np.ndarray
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """Draws what rows of success of `task`, int64 [n], led to.
 
     Returns:
-      [n, ...] tensors with `owner`; the actions are those of the rows.
+      Inputs [n, O], and the actions of the rows, [n, A].
     """
-    task = self._split(rows)
     chosen = self._final_offsets[task] + generator.integers(
       self._final_sizes[task]
     )
     at = torch.from_numpy(self._finals[chosen]).to(self._device)
-    owner = torch.from_numpy(task).to(self._device)
-    state, deviation = self._next_inputs[at], noise * self._deviations[owner]
+    return self._next_inputs[at], self._action[at]
 
-    def disturbed() -> torch.Tensor:
-      drawn = generator.standard_normal(state.shape, np.float32)
-      return state + deviation * torch.from_numpy(drawn).to(self._device)
-
-    return Batch(
-      disturbed(), self._action[at], disturbed(), owner=owner, examples=rows
-    )
-
-  def _split(self, rows: int) -> np.ndarray:
+  def split(self, rows: int) -> np.ndarray:
     """The task of each of `rows` rows: equal shares, the rest the main's."""
     tasks = len(self._sizes)
     counts = np.full(tasks, rows // tasks)

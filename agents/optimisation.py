@@ -1,15 +1,11 @@
 """Small parts of every gradient step."""
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import torch
 from torch import nn
-
-
-def product_dtype(bfloat16: bool) -> torch.dtype:
-  """The dtype of inputs, and so of the products that layers make with them."""
-  return torch.bfloat16 if bfloat16 else torch.float32
 
 
 def make_optimiser(
@@ -43,14 +39,14 @@ def clipped_step(
     optimiser: of `parameters`.
     loss: a scalar.
     parameters: those whose gradients are measured together.
-    max_norm: bound on their norm; infinity: none.
+    max_norm: bound on their norm; 0: none.
 
   Returns:
     The norm before clipping, a scalar.
   """
   optimiser.zero_grad()
   loss.backward()
-  norm = nn.utils.clip_grad_norm_(parameters, max_norm)
+  norm = nn.utils.clip_grad_norm_(parameters, max_norm or math.inf)
   optimiser.step()
   return norm.detach()
 

@@ -13,7 +13,7 @@ import torch
 
 from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.networks import layouts
-from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_deviation
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
 ARRAYS_FILE = "policy.safetensors"
@@ -60,8 +60,7 @@ class Policy:
       arrays: name -> array.
       options: `tasks` (list of str), `observation_size`, `action_size`,
         `hidden_size` (int), `layout` (of `networks/layouts.py`; missing: a
-        shared trunk), `absorbing_flag` (missing: False), `fine_scale`
-        (missing: 0): an agent's
+        shared trunk), `tanh_feature_scale` (missing: 0): an agent's
         `policy_options`.
 
     Returns:
@@ -88,20 +87,10 @@ class Policy:
       raise ValueError(f"policy options: {'; '.join(faults)}")
     assert tasks is not None
     observations, actions, hidden = (options[name] for name in _SIZES)
-    generator = torch.Generator()
-    standardiser = Standardiser(
-      observations,
-      bool(options.get("absorbing_flag", False)),
-      float(options.get("fine_scale", 0.0)),
-    )
-    inputs = standardiser.input_size
-    network = IntentionNetwork(
-      standardiser,
-      layouts.make_trunk(layout, inputs, hidden, generator),
-      layouts.make_intention_heads(
-        layout, len(tasks), inputs, hidden, actions, generator
-      ),
-      owns_trunk=True,
+    scale = float(options.get("tanh_feature_scale", 0.0))
+    standardiser = Standardiser(observations, scale)
+    network = layouts.make_intentions(
+      layout, standardiser, len(tasks), hidden, actions, torch.Generator()
     )
     serialisation.load_module_state(network, arrays, "policy arrays")
     return cls(network.requires_grad_(False), tasks)
@@ -166,8 +155,7 @@ class Policy:
       "action_size": self.action_size,
       "hidden_size": network.heads.output.weight.shape[1],
       "layout": layouts.layout_of(network.heads),
-      "absorbing_flag": network.standardiser.absorbing_flag,
-      "fine_scale": network.standardiser.fine_scale,
+      "tanh_feature_scale": network.standardiser.tanh_feature_scale,
     }
 
   @property
@@ -216,13 +204,11 @@ class Policy:
       )
       network = self._network
       inputs = network.standardiser(raw if raw.dim() > 1 else raw[None])
-      mean, deviation = network.heads.one(network.trunk(inputs), index)
+      mean, std = network.heads.one(network.trunk(inputs), index)
       if not deterministic:
         source = self._generator if generator is None else generator
         noise = source.standard_normal(mean.shape, np.float32)
-        mean = mean + to_deviation(deviation) * torch.from_numpy(noise).to(
-          self._device
-        )
+        mean = mean + to_std(std) * torch.from_numpy(noise).to(self._device)
       action = torch.tanh(mean).cpu().numpy()
     return action if raw.dim() > 1 else action[0]
 

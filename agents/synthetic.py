@@ -1,22 +1,12 @@
 """Made-up demonstrations and transitions, for tests and benchmarks."""
 
-import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
+from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
-
-
-@dataclasses.dataclass(frozen=True)
-class SyntheticDemonstrations:
-  """One task's demonstrations: a cloud of its own in observations."""
-
-  observation: np.ndarray  # float32 [N, O]
-  action: np.ndarray  # float32 [N, A]
-  next_observation: np.ndarray  # float32 [N, O]
-  episode: np.ndarray  # int32 [N]
-  is_last: np.ndarray  # bool [N]
 
 
 def demonstrations(
@@ -26,7 +16,7 @@ def demonstrations(
   action_size: int,
   seed: int = 0,
   attempt: int = 50,
-) -> dict[str, SyntheticDemonstrations]:
+) -> dict[str, Demonstrations]:
   """Draws a cloud for each task, with an action that depends on the state.
 
   Args:
@@ -54,7 +44,7 @@ def demonstrations(
   for task in tasks:
     observation = cloud()
     action = 0.8 * np.tanh(observation @ matrix / observation_size**0.5)
-    made[task] = SyntheticDemonstrations(
+    made[task] = Demonstrations(
       observation,
       action.astype(np.float32),
       np.roll(observation, -1, axis=0),
@@ -78,35 +68,18 @@ def transitions(
   )
 
 
-class ArrayReplay:
-  """A fixed replay over given transitions."""
-
-  def __init__(
-    self,
-    rows: Transition,
-    rewards: np.ndarray | None = None,
-    reward_tasks: Sequence[str] = (),
-  ):
-    """Keeps the arrays [N, ...] and rewards [N, `reward_tasks`], if any."""
-    self._rows = rows
-    self._rewards = rewards
-    self.reward_tasks = tuple(reward_tasks)
-
-  def __len__(self) -> int:
-    """Transitions stored."""
-    return len(self._rows.action)
-
-  def sample_indices(
-    self, generator: np.random.Generator, count: int, /
-  ) -> np.ndarray:
-    """Draws int64 [count], uniform with replacement."""
-    return generator.integers(len(self), size=count)
-
-  def gather(self, indices: np.ndarray, /) -> Transition:
-    """Copies rows out: float32 arrays [count, ...]."""
-    return Transition(*(array[indices] for array in self._rows))
-
-  def gather_rewards(self, indices: np.ndarray, /) -> np.ndarray:
-    """Copies their rewards out: float32 [count, `reward_tasks`]."""
-    assert self._rewards is not None, "this replay keeps no rewards"
-    return self._rewards[indices]
+def replay(
+  rows: Transition,
+  rewards: np.ndarray | None = None,
+  reward_tasks: Sequence[str] = (),
+) -> Replay:
+  """A full replay of transitions [N, ...], in memory."""
+  count, observation_size = rows.observation.shape
+  made = Replay(
+    count,
+    observation_size,
+    rows.action.shape[1],
+    reward_tasks=reward_tasks,
+  )
+  made.add_batch(rows, rewards)
+  return made

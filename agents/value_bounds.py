@@ -10,12 +10,9 @@ _LEAST = 0.01  # a bound's reward is at least so far from 0
 
 
 class ValueBounds:
-  """Running medians over updates of what bounds each task's values.
+  """The least and greatest reward of a batch, over 1 - gamma.
 
-  With rewards from a discriminator or stored ones, the least and the greatest
-  reward of a batch, over 1 - gamma. With examples of success, the bounds
-  follow from the rewards -1 and +1, but for the rows of the replay: theirs is
-  the value that the examples have now.
+  Both are running medians over updates.
   """
 
   def __init__(
@@ -33,39 +30,22 @@ class ValueBounds:
     self._rows = torch.full((window, 2, tasks), torch.nan, device=device)
     self._horizon = 1.0 / max(1.0 - discount, 1e-8)
 
-  def of_rewards(
-    self, reward: torch.Tensor
+  def __call__(
+    self, reward: torch.Tensor, value: torch.Tensor
   ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Takes a batch's rewards in.
+    """Takes in a batch.
 
     Args:
       reward: [K, B].
+      value: [K, B], the first critics' now, without gradient.
 
     Returns:
-      The least and the greatest possible value, [K, 1] each.
+      The least possible value [K, 1] and the greatest, [K, 1] or [K, B].
     """
     low = reward.amin(1).clamp(max=-_LEAST)
     high = reward.amax(1).clamp(min=_LEAST)
     low, high = self._median(torch.stack([low, high]))
     return low[:, None] * self._horizon, high[:, None] * self._horizon
-
-  def of_examples(
-    self, value: torch.Tensor, own: torch.Tensor, scale: float
-  ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Takes the examples' values in.
-
-    Args:
-      value: [K, B], the first critics', without gradient.
-      own: bool [K, B], whether a row is the task's own example.
-      scale: the reward of an example; that of all else is -scale.
-
-    Returns:
-      The least possible value [K, 1] and the greatest [K, B].
-    """
-    mean = (value * own).sum(1) / own.sum(1)
-    high = self._median(torch.stack([mean, mean]))[0]
-    most = torch.full_like(value, scale * self._horizon)
-    return -most[:, :1], torch.where(own, most, high[:, None])
 
   def state_dict(self) -> dict[str, Any]:
     """The rows that the medians run over."""

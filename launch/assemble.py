@@ -69,13 +69,13 @@ def make_replay(
       parts.environment, parts.tasks
     )
   # A full ring must still hold the rows of the last checkpoint.
-  episode = getattr(config.agent, "episode_steps", 0)
   is_ring = config.replay_capacity < config.env_steps or config.transfer_from
+  slack = config.checkpoint_every + 2 * config.most_episode_steps
   return Replay(
     config.replay_capacity if folder else 1,
     *parts.widths,
     folder,
-    slack=config.checkpoint_every + 2 * episode if is_ring else 0,
+    slack=slack if is_ring else 0,
     reward_tasks=reward_tasks,
   )
 
@@ -96,6 +96,8 @@ def make_agent(
     seeding.derive(config.seed, "agent"),
     parts.device,
     *parts.widths,
+    bfloat16=config.bfloat16,
+    cuda_graphs=config.cuda_graphs,
   )
 
 
@@ -132,20 +134,19 @@ def make_run(
 
 
 def _schedule(config: RunConfig, progress_bar: bool) -> TrainSchedule:
-  pace = {}
-  if not ALGORITHMS[config.algorithm].is_supervised:
-    pace["warmup_steps"] = config.agent.warm_up
-    if config.transfer_from:  # there is a replay from the start
-      pace["warmup_steps"] = min(config.agent.warm_up, config.agent.batch_size)
-    pace["updates_per_step"] = config.agent.updates_per_step
+  warm_up = config.warm_up
+  if config.transfer_from:  # there is a replay from the start
+    warm_up = min(warm_up, config.agent.batch_size)
   return TrainSchedule(
     env_steps=config.env_steps,
     log_every=config.log_every,
     evaluate_every=config.evaluate_every,
     checkpoint_every=config.checkpoint_every,
+    warmup_steps=warm_up,
+    random_steps=config.random_steps,
+    updates_per_step=config.updates_per_step,
     evaluate_first=config.evaluate_first,
     progress_bar=progress_bar,
-    **pace,
   )
 
 

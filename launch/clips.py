@@ -69,10 +69,9 @@ def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
   from lfgp_dmc.launch import configs
 
   with command.checked_input():
-    agent = configs.from_dict(run_folder.settings(spec.config)).agent
-    periods = -(-agent.episode_steps // agent.xi)
+    agent: Any = configs.from_dict(run_folder.settings(spec.config)).agent
     scheduler = make_scheduler(
-      agent, spec.tasks, 0, periods, np.random.default_rng(seed)
+      agent.scheduler, spec.tasks, np.random.default_rng(seed)
     )
   path = checkpoints.latest(run_folder.RunFolder(spec.folder).checkpoints)
   if path is not None:
@@ -82,7 +81,7 @@ def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
 
   def choose(step: int, timestep: dm_env.TimeStep) -> str:
     nonlocal chosen
-    if step % agent.xi == 0:
+    if step % agent.scheduler.xi == 0:
       chosen = spec.tasks[scheduler.next_task()]
     return chosen
 

@@ -1,14 +1,12 @@
 """The flags `--preset` and `--config.x.y=...`, and what they come to.
 
-The fields under `config.agent` depend on the algorithm and their defaults on
-the preset, so both are looked up among the arguments before the flag `config`
-is defined with them.
+The fields under `config.agent` depend on the algorithm and on the kinds of its
+groups, their defaults on the preset: these are looked up among the arguments
+before the flag `config` is defined with them.
 """
 
-import difflib
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from absl import flags
 from ml_collections import config_flags
@@ -30,17 +28,24 @@ def define(
   """
   algorithm = _last(arguments, "config.algorithm", "lfgp")
   preset = _last(arguments, "preset", "paper")
-  defaults = configs.make_config(algorithm, preset)
-  known = dict(_flattened(defaults.to_dict()))
-  for argument in arguments:
-    name = _name(argument)
-    if name.startswith("config.") and name[len("config.") :] not in known:
-      raise ValueError(f"unknown --{name}; {_hint(name, known)}")
+  names = [_name(argument).removeprefix("config.") for argument in arguments]
+  kinds = {
+    name: _last(arguments, f"config.{name}", "")
+    for name in names
+    if name.startswith("agent.") and name.endswith(configs.KIND)
+  }
+  main_task = _last(arguments, "config.main_task", "")
+  defaults = configs.make_config(algorithm, preset, main_task, kinds)
+  known = dict(configs.flattened(defaults.to_dict()))
+  for argument, name in zip(arguments, names, strict=True):
+    if _name(argument) == f"config.{name}" and name not in known:
+      close = configs.hint(name, known, "--config.")
+      raise ValueError(f"unknown --config.{name}; {close}")
   flags.DEFINE_string(
     "preset",
     "paper",
     "Defaults of the config: paper (the paper's tables), ral (the authors' "
-    "later journal version) or fast (ours). --config.x=... "
+    "later journal version), fast or fast_precise (ours). --config.x=... "
     "overrides.",
     flag_values=flag_values,
   )
@@ -72,22 +77,6 @@ def is_given() -> bool:
   """Whether a preset or any setting was given, in a flagfile or not."""
   overrides = config_flags.get_override_values(flags.FLAGS["config"])
   return bool(overrides) or flags.FLAGS["preset"].present > 0
-
-
-def _flattened(
-  values: Mapping[str, Any], prefix: str = ""
-) -> Iterator[tuple[str, Any]]:
-  for name, value in values.items():
-    if isinstance(value, dict):
-      yield from _flattened(value, f"{prefix}{name}.")
-    else:
-      yield prefix + name, value
-
-
-def _hint(name: str, known: Mapping[str, Any]) -> str:
-  names = [f"--config.{field}" for field in known]
-  close = difflib.get_close_matches(f"--{name}", names)
-  return f"did you mean {' or '.join(close)}?" if close else "see --help"
 
 
 def _name(argument: str) -> str:

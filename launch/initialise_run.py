@@ -12,7 +12,7 @@ from lfgp_dmc.types import Agent
 
 
 def initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
-  """Carries over what `transfer_from` and `agent.init_from` name.
+  """Carries over what `transfer_from` and `init_from` name.
 
   Args:
     config: of the new run.
@@ -23,27 +23,23 @@ def initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
     ValueError: the other folder cannot be used for this run; the message says
       why.
   """
-  init_from = getattr(config.agent, "init_from", "")
-  for name, folder in (
-    ("config.transfer_from", config.transfer_from),
-    ("config.agent.init_from", init_from),
-  ):
-    if folder and not isinstance(agent, LfgpAgent):
-      raise ValueError(
-        f"{name} is {folder!r}; valid: nothing, since {config.algorithm} "
-        "learns from demonstrations alone"
-      )
-  if not isinstance(agent, LfgpAgent) or replay is None:
+  if not (config.transfer_from or config.init_from):
     return
+  if not isinstance(agent, LfgpAgent) or replay is None:
+    raise ValueError(
+      f"config.transfer_from is {config.transfer_from!r}; valid: nothing, "
+      f"since {config.algorithm} keeps no replay"
+    )
   if config.transfer_from:
-    _transfer(RunFolder(pathlib.Path(config.transfer_from)), agent, replay)
-  if init_from:
-    agent.start_from(Policy.load(init_from))
-    print(f"the intentions start as those of {init_from}")
+    _transfer(config, agent, replay)
+  if config.init_from:
+    agent.start_from(Policy.load(config.init_from))
+    print(f"the intentions start as those of {config.init_from}")
 
 
-def _transfer(source: RunFolder, agent: LfgpAgent, replay: Replay) -> None:
+def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
   """Section 5.2 of the paper: networks by task name, and the whole replay."""
+  source = RunFolder(pathlib.Path(config.transfer_from))
   try:
     tasks = run_folder.read_config(source.path)["policy"]["tasks"]
     path = checkpoints.latest(source.checkpoints)
@@ -57,6 +53,6 @@ def _transfer(source: RunFolder, agent: LfgpAgent, replay: Replay) -> None:
     ) from None
   except ValueError as error:
     raise ValueError(f"config.transfer_from: {error}") from None
-  agent.carry_over(networks, tasks)
+  agent.carry_over(networks, tasks, config.transfer_updates)
   rows = replay.copy_from(Replay.stored(source.replay))
   print(f"took over {path.name} of {source.path} with {rows} transitions")

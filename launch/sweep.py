@@ -4,10 +4,10 @@
   python launch/sweep.py --algorithms=lfgp,bc --main_tasks=stack --seeds=0,1 \
       --runs=runs/mine --train=--config.env_steps=200000 --dry_run
 
-A run is a flagfile with a seed: `lfgp` on `stack` is
-launch/flags/lfgp_stack.flags. Each gets one process with one thread; one that
-dies is resumed from its checkpoint, and what is done is not done again, so the
-same command goes on with a sweep that was stopped. Ctrl-C lets the runs write
+A run is a flagfile with a main task and a seed. Each gets one process with one
+thread; one that dies is resumed from its checkpoint, and what is done is not
+done again, so the same command goes on with a sweep that was stopped. Ctrl-C
+lets the runs write
 their checkpoints. RUNS/index.csv has a row a run, RUNS/NAME.log its output.
 With --ray_address=auto the runs go to a Ray cluster instead (`ray start` on
 each machine). Its nodes share this folder and have the same Python environment;
@@ -28,11 +28,9 @@ from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.sweep_jobs import Job
 from lfgp_dmc.runs import signals
 
-_ALGORITHMS = flags.DEFINE_list(
-  "algorithms", ["lfgp"], "First parts of flagfiles' names, or whole names."
-)
+_ALGORITHMS = flags.DEFINE_list("algorithms", ["lfgp"], "Names of flagfiles.")
 _MAIN_TASKS = flags.DEFINE_list(
-  "main_tasks", list(lfgp_dmc.MAIN_TASKS), "Last parts of flagfiles' names."
+  "main_tasks", list(lfgp_dmc.MAIN_TASKS), "Comma-separated."
 )
 _SEEDS = flags.DEFINE_list("seeds", ["0"], "Comma-separated.")
 _RUNS = flags.DEFINE_string("runs", "runs/sweep", "Folder for the runs.")

@@ -1,7 +1,7 @@
 """The runs of a sweep: which there are, what each is called, what is done.
 
-A run is named after its flagfile and seed: `lfgp_stack_0` is
-`launch/flags/lfgp_stack.flags` with `--config.seed=0`.
+A run is named after its flagfile, main task and seed: `lfgp_stack_0` is
+`launch/flags/lfgp.flags` with `--config.main_task=stack --config.seed=0`.
 """
 
 import csv
@@ -19,8 +19,6 @@ FLAGS = pathlib.Path(__file__).with_name("flags")
 INDEX_NAME = "index.csv"
 COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
            "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
-
-_OWN_TASK = tuple(f"_{task}" for task in ALL_TASKS)
 
 # States, in the life of a run.
 WAITING, RUNNING, DONE = "waiting", "running", "done"
@@ -60,6 +58,7 @@ class Job:
       return [f"--run={self.folder}", "--resume"]
     return [
       f"--flagfile={self.flagfile}",
+      f"--config.main_task={self.main_task}",
       f"--config.seed={self.seed}",
       *self.arguments,
       f"--run={self.folder}",
@@ -77,9 +76,9 @@ def make_jobs(
   """Every algorithm on every main task, seed by seed.
 
   Args:
-    algorithms: first parts of flagfiles' names, such as lfgp or lfgp_play; a
-      name that ends with a task, such as lfgp_move_object, is the whole.
-    main_tasks: last parts.
+    algorithms: names of flagfiles, such as lfgp or lfgp_play; with a task after
+      it, such as lfgp_move_object, on that task alone.
+    main_tasks: of the others.
     seeds: of each.
     runs: folder for the runs.
     arguments: more of `launch/train.py` for every run; `{runs}` and `{seed}`
@@ -92,15 +91,14 @@ def make_jobs(
   jobs = []
   for seed in seeds:
     for algorithm in algorithms:
-      is_whole = algorithm.endswith(_OWN_TASK)
-      for main_task in ("",) if is_whole else main_tasks:
-        stem = f"{algorithm}_{main_task}" if main_task else algorithm
+      stem, tasks = _split(algorithm, main_tasks)
+      for main_task in tasks:
         values = {"runs": runs, "seed": seed}
         job = Job(
           algorithm,
-          main_task or "own",
+          main_task,
           seed,
-          runs / f"{stem}_{seed}",
+          runs / f"{stem}_{main_task}_{seed}",
           flags / f"{stem}.flags",
           tuple(argument.format(**values) for argument in arguments),
         )
@@ -108,6 +106,16 @@ def make_jobs(
           job.state = MISSING
         jobs.append(job)
   return jobs
+
+
+def _split(
+  algorithm: str, main_tasks: Sequence[str]
+) -> tuple[str, Sequence[str]]:
+  """The flagfile's name, and the tasks that it is run on."""
+  for task in sorted(ALL_TASKS, key=len, reverse=True):
+    if algorithm.endswith(f"_{task}"):
+      return algorithm.removesuffix(f"_{task}"), (task,)
+  return algorithm, main_tasks
 
 
 def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:

@@ -30,7 +30,8 @@ _RESUME = flags.DEFINE_bool(
 
 def main() -> int:
   """Resolves the config, trains, and says where everything is."""
-  path, config = pathlib.Path(_RUN.value), _config()
+  config = _config()
+  path = pathlib.Path(configs.fill(_RUN.value, config.to_dict()))
   if not _RUN.value:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")

@@ -14,15 +14,15 @@ from lfgp_dmc.agents.bc.config import BcConfig
 from lfgp_dmc.agents.bc.pairs import SplitPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
 from lfgp_dmc.agents.demonstration_pool import (
-  DemonstrationArrays,
   check_sizes,
   pooled_observations,
 )
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.networks import layouts
-from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_deviation
+from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
 
 _LOSS = "behaviour_cloning"
@@ -43,6 +43,7 @@ class BcAgent:
     network: IntentionNetwork,
     pairs: SplitPairs,
     shuffling: np.random.Generator,
+    dtype: torch.dtype,
   ):
     """Puts the parts together; see `build`.
 
@@ -52,6 +53,7 @@ class BcAgent:
       network: what to train.
       pairs: of all tasks, split.
       shuffling: source of each epoch's order.
+      dtype: of products in training.
     """
     self.tasks = tuple(tasks)
     self._config = config
@@ -63,10 +65,9 @@ class BcAgent:
     self._cloner = IntentionCloner(
       network,
       config.learning_rate,
-      config.weight_decay,
-      config.max_gradient_norm or math.inf,
-      config.bfloat16,
+      config.optimiser,
       config.loss,
+      dtype,
     )
     device = network.standardiser.mean.device
     self._meter = Meter(tasks, (f"loss/{_LOSS}",), (_LOSS,), device)
@@ -107,10 +108,8 @@ class BcAgent:
       for index in range(len(self.tasks)):
         inputs, action = self._pairs.validation(index)
         mean, raw = network.heads.one(network.trunk(inputs[0]), index)
-        deviation = to_deviation(raw)
-        loss, _ = cloning_loss(
-          self._config.loss, mean[None], deviation[None], action
-        )
+        std = to_std(raw)
+        loss, _ = cloning_loss(self._config.loss, mean[None], std[None], action)
         losses.append(loss.item())
     return losses
 
@@ -170,24 +169,29 @@ class BcAgent:
 def build(
   config: BcConfig,
   tasks: Sequence[str],
-  demonstrations: Mapping[str, DemonstrationArrays],
+  demonstrations: Mapping[str, Demonstrations],
   replay: object,
   seed: int,
   device: torch.device | str,
   observation_size: int,
   action_size: int,
+  *,
+  bfloat16: bool = False,
+  **unused: object,
 ) -> BcAgent:
   """Builds a BC agent.
 
   Args:
     config: settings.
     tasks: names of the K tasks, the main task first.
-    demonstrations: task -> arrays.
+    demonstrations: by task.
     replay: not used; all builders take the same arguments.
     seed: every random number of the agent follows from it.
     device: where to compute.
     observation_size: O.
     action_size: A.
+    bfloat16: products in bfloat16; parameters stay float32.
+    unused: as `replay`.
 
   Returns:
     The agent; same seed and calls, same numbers.
@@ -195,31 +199,31 @@ def build(
   Raises:
     ValueError: demonstrations are missing, too few, or of other sizes.
   """
-  del replay
+  del replay, unused
   device = torch.device(device)
   observation = pooled_observations(demonstrations, tasks)
   check_sizes(demonstrations, tasks, observation_size, action_size)
-  standardiser = Standardiser(observation_size, fine_scale=config.fine_scale)
-  if config.standardise:
-    standardiser.fit(observation, config.deviation_floor)
+  standardiser = Standardiser(
+    observation_size, config.inputs.tanh_feature_scale
+  )
+  if config.inputs.standardise:
+    standardiser.fit(observation)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
-  layout, hidden = config.layout, config.hidden_size
-  inputs = standardiser.input_size
-  network = IntentionNetwork(
+  network = layouts.make_intentions(
+    config.networks.layout,
     standardiser,
-    layouts.make_trunk(layout, inputs, hidden, initial),
-    layouts.make_intention_heads(
-      layout, len(tasks), inputs, hidden, action_size, initial
-    ),
-    owns_trunk=True,
+    len(tasks),
+    config.networks.hidden_size,
+    action_size,
+    initial,
   ).to(device)
   pairs = SplitPairs(
     demonstrations,
     tasks,
     standardiser,
-    device,
     config.validation_share,
     seeding.generator(seed, "split"),
   )
   shuffling = seeding.generator(seed, "shuffling")
-  return BcAgent(config, tasks, network, pairs, shuffling)
+  dtype = torch.bfloat16 if bfloat16 else torch.float32
+  return BcAgent(config, tasks, network, pairs, shuffling, dtype)

@@ -1,11 +1,13 @@
 """Expert pairs for supervised learning: split once, shuffled each epoch."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import torch
 
-from lfgp_dmc.agents.demonstration_pool import DemonstrationArrays, ExpertBatch
+from lfgp_dmc.agents.batches import ExpertBatch
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.data.demonstrations import Demonstrations
 
 
 class SplitPairs:
@@ -18,20 +20,18 @@ class SplitPairs:
 
   def __init__(
     self,
-    demonstrations: Mapping[str, DemonstrationArrays],
+    demonstrations: Mapping[str, Demonstrations],
     tasks: Sequence[str],
-    standardise: Callable[[torch.Tensor], torch.Tensor],
-    device: torch.device | str,
+    standardiser: Standardiser,
     validation_share: float,
     generator: np.random.Generator,
   ):
-    """Copies the pairs to the device, standardised, and splits them.
+    """Copies the pairs to the standardiser's device and splits them.
 
     Args:
-      demonstrations: task -> arrays.
+      demonstrations: by task.
       tasks: the K tasks, in the order of every K axis.
-      standardise: raw observations [N, O] -> network inputs.
-      device: where to keep them.
+      standardiser: raw observations -> network inputs, on the device.
       validation_share: share of each task's pairs that is never trained on.
       generator: source of the split.
 
@@ -41,13 +41,13 @@ class SplitPairs:
     few = [task for task in tasks if len(demonstrations[task].action) < 2]
     if few:
       raise ValueError(f"fewer than 2 pairs of {', '.join(few)}: no split")
-    self._device = device
+    self._device = device = standardiser.mean.device
     inputs, actions, offset = [], [], 0
     self.train_rows: list[np.ndarray] = []  # of the pool, by task
     self.validation_rows: list[np.ndarray] = []
     for task in tasks:
       part = demonstrations[task]
-      inputs.append(standardise(_tensor(part.observation, device)))
+      inputs.append(standardiser(_tensor(part.observation, device)))
       actions.append(_tensor(part.action, device))
       size = len(part.action)
       held_out = min(max(round(validation_share * size), 1), size - 1)
@@ -92,7 +92,7 @@ class SplitPairs:
     return self.batch(rows[None])
 
 
-def _tensor(array: np.ndarray, device: torch.device | str) -> torch.Tensor:
+def _tensor(array: np.ndarray, device: torch.device) -> torch.Tensor:
   return torch.from_numpy(np.asarray(array, np.float32)).to(device)
 
 

@@ -1,4 +1,4 @@
-"""The LfGP agent as the training loop sees it, and its builder."""
+"""The LfGP agent as the training loop sees it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -8,13 +8,13 @@ import numpy as np
 import tqdm
 
 from lfgp_dmc import seeding
-from lfgp_dmc.agents import cloning, serialisation
+from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
-from lfgp_dmc.agents.lfgp import pretraining, transfer
-from lfgp_dmc.agents.lfgp.batches import BatchMaker, Replay, reward_columns
-from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.lfgp import transfer
+from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
+from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
@@ -26,50 +26,42 @@ class LfgpAgent:
 
   def __init__(
     self,
-    config: LfgpConfig,
     tasks: Sequence[str],
     learner: LfgpLearner,
+    batches: BatchMaker,
     scheduler: Scheduler,
+    pretraining: Pretraining,
     experts: ExpertPool | None,
-    replay: Replay,
     seed: int,
+    *,
+    xi: int,
+    discount: float,
   ):
-    """Puts the parts together; see `build`.
+    """Puts the parts together; see `builder.build`.
 
     Args:
-      config: settings.
       tasks: names of the K tasks, the main task first.
       learner: networks and updates.
+      batches: what updates are made on.
       scheduler: chooses intentions.
-      experts: all tasks' demonstrations; None if the config uses none.
-      replay: transitions, filled by the training loop.
-      seed: of the agent's own random streams.
+      pretraining: what comes before the first step.
+      experts: all tasks' demonstrations; None if none are used.
+      seed: of acting.
+      xi: steps a choice.
+      discount: gamma, of the scheduler's returns.
     """
     self.tasks = tuple(tasks)
-    self.policy = Policy(learner.networks.intentions, tasks)
-    self._config = config
     self.learner = learner
+    self.batches = batches
+    self.policy = Policy(learner.networks.intentions, tasks)
     self._scheduler = scheduler
+    self._pretraining = pretraining
     self._experts = experts
-    device = learner.networks.log_temperature.device
-    self._standardise = learner.networks.intentions.standardiser
     self._acting = seeding.generator(seed, "acting")
-    self._sampling = seeding.generator(seed, "sampling")
-    self.batches = BatchMaker(
-      config,
-      tasks,
-      replay,
-      experts,
-      self._standardise,
-      device,
-      self._sampling,
-    )
-    self._main_reward = 0
-    if config.keeps_rewards:
-      (self._main_reward,) = reward_columns(replay, tasks[:1])
+    self._xi, self._discount = xi, discount
+    device = learner.networks.log_temperature.device
     self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, device)
     self._choices = np.zeros(len(self.tasks), np.int64)
-    self._env_steps = 0
     self._episode_step = 0
     self._task = self.tasks[0]
     self._first_updates = 0  # before the first step, after a transfer
@@ -89,8 +81,7 @@ class LfgpAgent:
     """Lets the intentions start as those of a policy, by task name.
 
     Args:
-      policy: with the same sizes; its standardisation comes along, and so
-        does its trunk, for the critics too unless `actor_trunk` is "own".
+      policy: with the same sizes; its trunk and standardisation come along.
 
     Raises:
       ValueError: it has other sizes, or none of our tasks.
@@ -104,21 +95,21 @@ class LfgpAgent:
       "the policy",
     )
     self._refresh_inputs()
-    self.learner.adopt_intention_trunk()
 
   def carry_over(
     self,
     networks: Mapping[str, Mapping[str, np.ndarray]],
     source_tasks: Sequence[str],
+    updates: int = 0,
   ) -> None:
     """Takes over what another agent learned (section 5.2 of the paper).
 
-    Temperatures, optimisers and scheduler stay fresh. If a task is new,
-    `prepare` will make `transfer_updates` updates on the replay.
+    Temperatures, optimisers and scheduler stay fresh.
 
     Args:
       networks: `state_dict()["learner"]["networks"]` of the other agent.
       source_tasks: its tasks.
+      updates: if a task is new, `prepare` makes so many on the replay.
 
     Raises:
       ValueError: its networks have other sizes, or none of our tasks.
@@ -128,7 +119,7 @@ class LfgpAgent:
     transfer.carry_networks(own, networks, self.tasks, source_tasks)
     self._refresh_inputs()
     if set(self.tasks) - set(source_tasks):
-      self._first_updates = self._config.transfer_updates
+      self._first_updates = updates
 
   def prepare(self, progress_bar: bool = False) -> None:
     """Makes the updates that are due before the first step, if any.
@@ -138,20 +129,15 @@ class LfgpAgent:
     """
     if self._has_started:
       return
-    config, intentions = self._config, self.learner.networks.intentions
-    if config.bc_warm_start_updates:
-      assert self._experts is not None, "a warm start needs demonstrations"
-      pretraining.clone(
-        config, intentions, self._experts, self._sampling, progress_bar
-      )
-      self.learner.adopt_intention_trunk()
-    self.learner.adopt_prior()
-    has_precise_prior = (
-      config.prior_weight > 0 and config.bc_loss == cloning.LIKELIHOOD
+    learner = self.learner
+    intentions = learner.networks.intentions
+    self._pretraining(
+      intentions, self._experts, self.batches.generator, progress_bar
     )
-    if has_precise_prior and self._experts is not None:
-      pretraining.warn_of_precise_prior(
-        config, self.tasks, intentions, self._experts
+    if learner.prior is not None:
+      learner.prior.adopt(intentions)
+      learner.prior.warn_if_precise(
+        self.tasks, self._experts, learner.intentions.target_entropy
       )
     for _ in tqdm.trange(
       self._first_updates,
@@ -174,23 +160,16 @@ class LfgpAgent:
       observation: float32 [O].
 
     Returns:
-      float32 [A]; from U[-1, 1] during the first `random_steps` steps.
+      float32 [A].
     """
-    if self._episode_step % self._config.xi == 0:
-      self._choose()
+    if self._episode_step % self._xi == 0:
+      index = self._scheduler.next_task()
+      self._choices[index] += 1
+      self._task = self.tasks[index]
     self._episode_step += 1
-    self._env_steps += 1
-    if self._env_steps <= self._config.random_steps:
-      size = self.policy.action_size
-      return self._acting.uniform(-1, 1, size).astype(np.float32)
     return self.policy.act(
       observation, self._task, deterministic=False, generator=self._acting
     )
-
-  def _choose(self) -> None:
-    index = self._scheduler.next_task()
-    self._choices[index] += 1
-    self._task = self.tasks[index]
 
   def end_episode(self, episode: Episode) -> None:
     """Lets the scheduler learn from the main task's reward.
@@ -198,16 +177,14 @@ class LfgpAgent:
     Args:
       episode: the T steps since `begin_episode`.
     """
-    self._scheduler.end_episode(
-      period_returns(
-        self._main_rewards(episode), self._config.xi, self._config.discount
-      ).tolist()
-    )
+    rewards = self.learner.reward.main_rewards(episode)
+    returns = period_returns(rewards, self._xi, self._discount)
+    self._scheduler.end_episode(returns.tolist())
 
   def update(self) -> None:
     """Makes one update of all networks."""
     draw = self.batches.draw(self.learner.updates)
-    self._meter.add(self.learner.update(*draw))
+    self._meter.add(self.learner.update(draw))
 
   def metrics(self) -> Metrics:
     """Means since the last call; NaN for what has not happened since."""
@@ -217,11 +194,6 @@ class LfgpAgent:
       means[f"scheduler/{task}"] = float(count / total) if total else math.nan
     self._choices[:] = 0
     return means
-
-  def scheduler_probabilities(self) -> dict[str, float]:
-    """Task -> probability of being chosen next."""
-    values = self._scheduler.probabilities().tolist()
-    return dict(zip(self.tasks, values, strict=True))
 
   def policy_arrays(self) -> dict[str, np.ndarray]:
     """What acting needs, by name; with `policy_options`, a `Policy`."""
@@ -239,8 +211,7 @@ class LfgpAgent:
       "meter": self._meter.state_dict(),
       "choices": self._choices.copy(),
       "acting": serialisation.numpy_generator_state(self._acting),
-      "sampling": serialisation.numpy_generator_state(self._sampling),
-      "env_steps": self._env_steps,
+      "sampling": serialisation.numpy_generator_state(self.batches.generator),
       "has_started": self._has_started,
     }
 
@@ -251,23 +222,12 @@ class LfgpAgent:
     self._meter.load_state_dict(state["meter"])
     self._choices[:] = state["choices"]
     serialisation.load_numpy_generator_state(self._acting, state["acting"])
-    serialisation.load_numpy_generator_state(self._sampling, state["sampling"])
-    self._env_steps = int(state["env_steps"])
+    serialisation.load_numpy_generator_state(
+      self.batches.generator, state["sampling"]
+    )
     self._has_started = bool(state["has_started"])
     self._refresh_inputs()
     self._episode_step = 0
-
-  def _main_rewards(self, episode: Episode) -> np.ndarray:
-    """The main task's reward of each step, float [T]."""
-    match self._config.reward_source:
-      case "replay":
-        assert episode.rewards is not None, "the loop keeps rewards"
-        return episode.rewards[:, self._main_reward]
-      case "examples":
-        return np.full(len(episode.action), -self._config.reward_scale)
-    put = self.batches.put
-    inputs = self._standardise(put(episode.observation))
-    return self.learner.rewards(inputs, put(episode.action))[0].cpu().numpy()
 
   def _check_common(self, source_tasks: Sequence[str], what: str) -> None:
     if not set(self.tasks) & set(source_tasks):

@@ -1,234 +1,194 @@
-"""Every setting of the LfGP agent, checked when it is made."""
+"""Every setting of the LfGP agent, in the groups that its parts take.
 
-import dataclasses
-from collections.abc import Mapping
-from typing import Any
+Defaults are the paper's hyper-parameter table for AIL algorithms.
+"""
 
-from lfgp_dmc.agents import cloning, field_checks, rewards, schedulers
-from lfgp_dmc.agents.networks import discriminator, layouts
+from typing import Annotated, Literal
 
-ACTOR_TRUNKS = ("shared", "own")
-MIXINGS = ("float", "row")  # of replay and expert rows, for the penalty
-# Where rewards come from: the discriminators; the replay, which stores dense
-# rewards (SAC-X); examples of success, +1 for a task's own and -1 for all else.
-REWARD_SOURCES = ("discriminator", "replay", "examples")
+from pydantic import Field, model_validator
+
+from lfgp_dmc.agents.fields import (
+  Count,
+  InputsConfig,
+  NetworksConfig,
+  NonNegative,
+  OptimiserConfig,
+  Positive,
+  PositiveInt,
+  PositiveShare,
+  Real,
+  Share,
+  Slices,
+  Switch,
+  checked,
+)
+from lfgp_dmc.agents.schedulers.config import AnyScheduler, QTableConfig
 
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+@checked
+class LfgpNetworksConfig(NetworksConfig):
+  """Sizes and options of intentions and critics."""
+
+  # "own": a second trunk, trained by the policy loss; else it is the critics'.
+  actor_trunk: Literal["shared", "own"] = "shared"
+  critic_layer_norm: Switch = False
+
+
+@checked
+class CriticConfig:
+  """Values, and bounds on them."""
+
+  learning_rate: Positive = 3e-4
+  discount: Share = 0.99  # gamma, a step
+  polyak: PositiveShare = 0.005  # share of the online network
+  warmup_updates: Count = 0  # first updates, without the intentions
+  value_penalty: NonNegative = 0.0  # lambda, on values out of bounds
+  value_penalty_window: PositiveInt = 50  # updates of the bounds' medians
+
+
+@checked
+class IntentionConfig:
+  """Policies and their temperatures."""
+
+  learning_rate: Positive = 1e-5
+  temperature_learning_rate: Positive = 3e-4
+  initial_temperature: Positive = 1.0  # alpha
+  target_entropy: Real = -4.0  # nats
+
+
+@checked
+class DiscriminatorReward:
+  """Rewards from discriminators of expert and policy."""
+
+  kind: Literal["discriminator"] = "discriminator"
+  form: Literal["logit", "probability", "gail", "log_probability"] = "logit"
+  clip: NonNegative = 0.0  # bound on |reward| before scaling; 0: none
+  scale: Positive = 1.0
+  learning_rate: Positive = 3e-4
+  batch_size: PositiveInt = 256  # expert pairs a task
+  input: Literal["state_action", "state"] = "state_action"
+  masked: Slices = ""  # of an observation, such as 3:6,53:59
+  # If set, the main task gets its own discriminator with these masked instead.
+  main_masked: Slices = ""
+  noise: NonNegative = 0.0  # on standardised observations
+  every: PositiveInt = 1  # updates between its updates
+  final_share: Share = 0.0  # of expert pairs, rows of success
+  gradient_penalty: NonNegative = 10.0  # lambda
+  gradient_penalty_per_task: Switch = False
+  # Expert rows among those of critics and intentions.
+  expert_share: Share = 0.0
+  expert_share_decay: Share = 1.0  # factor an update
+
+
+@checked
+class StoredReward:
+  """Dense rewards that the replay stores (SAC-X)."""
+
+  kind: Literal["stored"] = "stored"
+  clip: NonNegative = 0.0  # bound on |reward| before scaling; 0: none
+  scale: Positive = 1.0
+
+
+@checked
+class ExampleReward:
+  """+1 for a task's own examples of success, -1 for all else."""
+
+  kind: Literal["examples"] = "examples"
+  scale: Positive = 1.0  # the authors' later work: 0.1
+  share: Share = 0.5  # of the critics' batch
+  noise: NonNegative = 0.1  # on examples, in the demonstrations' std
+
+
+RewardConfig = DiscriminatorReward | StoredReward | ExampleReward
+
+
+@checked
+class PretrainingConfig:
+  """Behaviour cloning before the first step."""
+
+  updates: Count = 0
+  learning_rate: Positive = 3e-4  # falls to 0, a cosine
+  loss: Literal["squared_error", "likelihood"] = "squared_error"
+  std: NonNegative = 0.0  # of the cloned intentions; 0: as it comes out
+
+
+@checked
+class PriorConfig:
+  """Staying near the first intentions, on the replay's rows."""
+
+  weight: NonNegative = 0.0
+  distance: Literal["squared_error", "divergence"] = "squared_error"
+  normalise: Switch = False  # times each task's mean |Q|
+  decay: Share = 1.0  # factor on the weight, an update
+
+
+@checked
 class LfgpConfig:
-  """Defaults are the paper's hyper-parameter table for AIL algorithms."""
+  """LfGP; LfGP-NS, DAC and SAC-X are settings of it."""
 
-  # Loop, in environment steps.
-  warm_up: int = 1000  # transitions before the first update
-  random_steps: int = 1000  # first steps with actions from U[-1, 1]
-  updates_per_step: float = 1.0  # the training loop holds this ratio
-  episode_steps: int = 360  # sets the scheduler's choices an episode
+  batch_size: PositiveInt = 256
+  inputs: InputsConfig = InputsConfig()
+  networks: LfgpNetworksConfig = LfgpNetworksConfig()
+  optimiser: OptimiserConfig = OptimiserConfig()
+  critic: CriticConfig = CriticConfig()
+  intention: IntentionConfig = IntentionConfig()
+  reward: Annotated[RewardConfig, Field(discriminator="kind")] = (
+    DiscriminatorReward()
+  )
+  scheduler: AnyScheduler = QTableConfig()
+  pretraining: PretrainingConfig = PretrainingConfig()
+  prior: PriorConfig = PriorConfig()
 
-  # Networks.
-  hidden_size: int = 256
-  layout: str = layouts.SHARED_TRUNK  # "separate": each head its own (DAC)
-  actor_trunk: str = "shared"  # "own": a second trunk, trained by the policy
-  critic_layer_norm: bool = False
-  standardise: bool = False  # inputs by the demonstrations' mean, deviation
-  deviation_floor: float = 0.01  # smallest deviation, in the input's unit
-  fine_scale: float = 0.0  # c of inputs tanh(x / c) beside x (m); 0: none
-  absorbing_flag: bool = False  # a last input, 0: no state is absorbing here
-  bfloat16: bool = False  # products in bfloat16; parameters stay float32
-  cuda_graphs: bool = True  # on a GPU: updates recorded, then replayed
-
-  # Intentions and critics.
-  batch_size: int = 256
-  discount: float = 0.99  # gamma, a step
-  polyak: float = 0.005  # share of the online network
-  critic_learning_rate: float = 3e-4
-  intention_learning_rate: float = 1e-5
-  temperature_learning_rate: float = 3e-4
-  initial_temperature: float = 1.0  # alpha
-  target_entropy: float = -4.0  # nats
-  max_gradient_norm: float = 10.0  # critics, intentions, log alpha apart
-  weight_decay: float = 0.0  # above 0: AdamW, on all but alpha
-  value_penalty: float = 0.0  # lambda of values out of bounds (later work: 10)
-  value_penalty_window: int = 50  # updates that the bounds' medians run over
-  freeze_updates: int = 0  # first updates, with the intentions' trunk frozen
-  intention_delay: int = 0  # first updates, of critics and discriminators alone
-
-  # Rewards.
-  reward_source: str = "discriminator"  # or "replay", "examples"
-  reward: str = "logit"  # of discriminators; see agents/rewards.py
-  reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
-  reward_scale: float = 1.0  # later work, with examples: 0.1
-  example_share: float = 0.5  # of the critics' batch, if rewards are examples'
-  example_noise: float = 0.1  # on examples, in the demonstrations' deviations
-
-  # Discriminators.
-  discriminator_learning_rate: float = 3e-4
-  discriminator_batch_size: int = 256  # expert pairs a task
-  discriminator_input: str = "state_action"  # or "state"
-  discriminator_unseen: str = ""  # of an observation, such as 3:6,53:59
-  # If any, the main task has a discriminator of its own that does not see these
-  # (instead of those above).
-  main_discriminator_unseen: str = ""
-  discriminator_noise: float = 0.0  # on observations, in deviations
-  discriminator_every: int = 1  # updates between its updates
-  discriminator_final_share: float = 0.0  # of expert pairs, rows of success
-  gradient_penalty: float = 10.0  # lambda
-  gradient_penalty_per_task: bool = False
-  gradient_penalty_mixing: str = "float"  # a share for each; "row": one for all
-
-  # Scheduler.
-  scheduler: str = "q_table"
-  xi: int = 45  # steps a choice
-  scheduler_phi: float = 0.6
-  scheduler_temperature: float = 360.0
-  scheduler_decay: float = 0.9995
-  scheduler_minimum: float = 0.1
-  main_weight: float = 0.5  # weighted random: the main task's
-  handcrafted_probability: float = 0.5
-
-  # Use of demonstrations beyond the discriminators.
-  expert_share: float = 0.0  # of the critics' and intentions' batch
-  expert_share_decay: float = 1.0  # factor an update
-  bc_loss: str = cloning.SQUARED_ERROR  # or "likelihood"; prior: divergence
-  bc_weight: float = 0.0  # BC term in the intentions' loss
-  bc_normalise: bool = False  # times each task's mean |Q|
-  bc_decay: float = 1.0  # factor on the weight an update
-  prior_weight: float = 0.0  # stay near the first intentions, on all rows
-  bc_warm_start_updates: int = 0  # pure BC before the first step
-  bc_learning_rate: float = 3e-4  # of the warm start; falls to 0, a cosine
-  cloned_deviation: float = 0.0  # after it; 0: 0.7, or what was cloned
-
-  # Other runs.
-  init_from: str = ""  # policy folder whose intentions the actor starts from
-  transfer_updates: int = 1000  # before the first step, if a task is new
-
-  def __post_init__(self):
-    """Raises ValueError that lists every field out of its range."""
-    faults = field_checks.faults(self, _RANGES, _CHOICES)
-    if self.discriminator_noise and not self.standardise:
+  @model_validator(mode="after")
+  def _check_groups(self):
+    """Raises ValueError: groups do not go together."""
+    faults = [*self._reward_faults()]
+    if self.pretraining.updates and self.shares_trunk:
       faults.append(
-        f"discriminator_noise is {self.discriminator_noise!r}; valid: 0 "
-        "unless standardise is True (its unit is the standardised input's)"
+        "networks.actor_trunk is 'shared'; valid: own, if there are "
+        "pretraining.updates (the critics' loss would undo them)"
       )
-    if self.init_from and self.bc_warm_start_updates:
-      faults.append(
-        f"init_from is {self.init_from!r}; valid: nothing, if there are "
-        "bc_warm_start_updates"
-      )
-    if not faults:
-      faults = self._reward_faults()
     if faults:
-      raise ValueError(f"LfgpConfig: {'; '.join(faults)}")
+      raise ValueError("\n".join(faults))
+    return self
 
-  def _reward_faults(self) -> list[str]:
-    """What does not go together with the source of rewards."""
-    source, faults = self.reward_source, []
-    if source != "discriminator" and self.expert_share:
-      faults.append(
-        f"expert_share is {self.expert_share!r}; valid: 0 unless reward_source "
-        "is discriminator (expert rows have no other reward)"
-      )
-    if source != "examples":
-      return faults
-    if self.scheduler == "q_table":
-      faults.append(
-        "scheduler is 'q_table'; valid: another, if reward_source is examples "
-        "(whatever is done earns -1)"
-      )
-    rows = int(self.example_share * self.batch_size)
-    if not 0 < rows < self.batch_size:
-      faults.append(
-        f"example_share is {self.example_share!r}; valid: one that puts some "
-        "of batch_size rows on either side"
-      )
-    return faults
+  def _reward_faults(self):
+    reward = self.reward
+    if isinstance(reward, DiscriminatorReward):
+      if reward.noise and not self.inputs.standardise:
+        yield (
+          f"reward.noise is {reward.noise!r}; valid: 0 unless "
+          "inputs.standardise is True (its unit is the standardised input's)"
+        )
+    elif isinstance(reward, ExampleReward):
+      if self.scheduler.kind == "q_table":
+        yield (
+          "scheduler.kind is 'q_table'; valid: another, if reward.kind is "
+          "examples (whatever is done earns -1)"
+        )
+      if not 0 < int(reward.share * self.batch_size) < self.batch_size:
+        yield (
+          f"reward.share is {reward.share!r}; valid: one that puts some of "
+          "batch_size rows on either side"
+        )
+
+  @property
+  def shares_trunk(self) -> bool:
+    """Whether critics and intentions have a trunk in common."""
+    networks = self.networks
+    has_trunk = networks.layout == "shared_trunk"
+    return has_trunk and networks.actor_trunk == "shared"
 
   @property
   def uses_demonstrations(self) -> bool:
     """Whether there is anything to do with demonstrations."""
     return (
-      self.reward_source != "replay"
-      or self.bc_weight > 0
-      or self.bc_warm_start_updates > 0
-      or self.standardise
+      not self.keeps_rewards
+      or self.pretraining.updates > 0
+      or self.inputs.standardise
     )
 
   @property
   def keeps_rewards(self) -> bool:
     """Whether the replay has to keep dense rewards."""
-    return self.reward_source == "replay"
-
-  @property
-  def owns_trunk(self) -> bool:
-    """Whether the intentions have a trunk apart from the critics'.
-
-    They do if asked for, and if they start from cloned behaviour, which the
-    critics' loss would undo; unless the common trunk is frozen at first.
-    """
-    is_cloned = self.bc_warm_start_updates > 0 or bool(self.init_from)
-    return self.actor_trunk == "own" or (is_cloned and self.freeze_updates == 0)
-
-  @classmethod
-  def from_mapping(cls, values: Mapping[str, Any]) -> "LfgpConfig":
-    """Makes a config from field names and values.
-
-    Raises:
-      ValueError: a name is no field, or a value is out of its range.
-    """
-    names = {field.name for field in dataclasses.fields(cls)}
-    unknown = sorted(set(values) - names)
-    if unknown:
-      raise ValueError(
-        f"LfgpConfig has no {', '.join(unknown)}; valid: "
-        f"{', '.join(sorted(names))}"
-      )
-    return cls(**values)
-
-
-_INTEGERS_ABOVE_0 = (
-  "warm_up episode_steps hidden_size batch_size xi "
-  "discriminator_batch_size discriminator_every value_penalty_window"
-)
-_NUMBERS_ABOVE_0 = (
-  "updates_per_step deviation_floor critic_learning_rate "
-  "intention_learning_rate temperature_learning_rate initial_temperature "
-  "max_gradient_norm reward_scale discriminator_learning_rate "
-  "bc_learning_rate scheduler_temperature scheduler_minimum"
-)
-_NUMBERS_FROM_0 = (
-  "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
-  "value_penalty example_noise fine_scale prior_weight "
-  "cloned_deviation"
-)
-_SHARES = (
-  "discount discriminator_final_share expert_share expert_share_decay "
-  "bc_decay scheduler_phi main_weight handcrafted_probability example_share"
-)
-_SWITCHES = (
-  "critic_layer_norm standardise bfloat16 cuda_graphs bc_normalise "
-  "gradient_penalty_per_task absorbing_flag"
-)
-# What is valid -> names of fields; see `field_checks.py`.
-_RANGES = {
-  "an integer above 0": _INTEGERS_ABOVE_0,
-  "an integer, 0 or more": "random_steps bc_warm_start_updates "
-  "freeze_updates intention_delay transfer_updates",
-  "a number above 0": _NUMBERS_ABOVE_0,
-  "a number, 0 or more": _NUMBERS_FROM_0,
-  "a number": "target_entropy",
-  "a number from 0 to 1": _SHARES,
-  "a number above 0, at most 1": "polyak scheduler_decay",
-  "True or False": _SWITCHES,
-  "a folder's name, or nothing": "init_from",
-  "slices of an observation, such as 3:6,53:59": "discriminator_unseen "
-  "main_discriminator_unseen",
-}
-_CHOICES: dict[str, tuple[str, ...]] = {
-  "actor_trunk": ACTOR_TRUNKS,
-  "bc_loss": cloning.LOSSES,
-  "discriminator_input": discriminator.INPUTS,
-  "gradient_penalty_mixing": MIXINGS,
-  "layout": layouts.LAYOUTS,
-  "reward": tuple(rewards.VARIANTS),
-  "reward_source": REWARD_SOURCES,
-  "scheduler": schedulers.NAMES,
-}
+    return isinstance(self.reward, StoredReward)

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 
 import torch
 
-from lfgp_dmc.agents.lfgp.batches import Draw
+from lfgp_dmc.agents.batches import Draw
 
 Metrics = dict[str, torch.Tensor]
 Update = Callable[[], Metrics]

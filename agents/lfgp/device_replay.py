@@ -1,48 +1,21 @@
-"""The replay's rows once more, on the device that learns.
+"""A device-side mirror of the replay.
 
 A GPU that fetched its rows from the host for every update would mostly wait.
 Here each row crosses over once; batches are then gathered on the device.
 """
 
-from typing import Protocol
-
 import numpy as np
 import torch
 
-from lfgp_dmc.types import Transition
+from lfgp_dmc.data.replay import Replay
 
 _CHUNK = 65_536  # rows copied at a time
 
 
-class RingReplay(Protocol):
-  """What is read of the replay; see `lfgp_dmc.replay.Replay`."""
-
-  @property
-  def capacity(self) -> int:
-    """The most rows that can be sampled."""
-
-  @property
-  def total(self) -> int:
-    """Rows ever added, less those withdrawn."""
-
-  @property
-  def widths(self) -> tuple[int, int]:
-    """The sizes (O, A)."""
-
-  def take_low_mark(self) -> int:
-    """The smallest `total` since the last call: rows below have not changed."""
-
-  def __len__(self) -> int:
-    """Rows that can be sampled."""
-
-  def gather(self, indices: np.ndarray, /) -> Transition:
-    """Copies rows out; index 0 is the oldest."""
-
-
-class DeviceRows:
+class DeviceReplay:
   """A copy of the rows that can be sampled, brought up to date as they grow."""
 
-  def __init__(self, replay: RingReplay, device: torch.device):
+  def __init__(self, replay: Replay, device: torch.device):
     """Takes memory for all of the capacity, 488 bytes a row at 59 + 4 floats.
 
     Args:

@@ -2,19 +2,14 @@
 
 import torch
 
-from lfgp_dmc.agents.demonstration_pool import Batch, ExpertBatch
-from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents.fields import OptimiserConfig
+from lfgp_dmc.agents.lfgp.config import IntentionConfig
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
-from lfgp_dmc.agents.lfgp.prior import CloningTerms
+from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.losses.intention import intention_loss
 from lfgp_dmc.agents.losses.temperature import temperature_loss
 from lfgp_dmc.agents.networks import tanh_gaussian
-from lfgp_dmc.agents.optimisation import (
-  clipped_step,
-  frozen,
-  make_optimiser,
-  product_dtype,
-)
+from lfgp_dmc.agents.optimisation import clipped_step, frozen, make_optimiser
 
 Metrics = dict[str, torch.Tensor]
 
@@ -22,62 +17,46 @@ _SATURATED = 0.99
 
 
 class IntentionLearner:
-  """Trains intentions and temperatures by what the critics say."""
+  """Trains intentions and temperatures by the critics' values."""
 
   def __init__(
     self,
-    config: LfgpConfig,
+    config: IntentionConfig,
+    optimiser: OptimiserConfig,
     networks: LfgpNetworks,
+    prior: Prior | None,
     generator: torch.Generator,
+    dtype: torch.dtype,
   ):
     """Makes the optimisers.
 
     Args:
       config: settings.
+      optimiser: likewise.
       networks: intentions and temperatures, what to train; and the critics.
+      prior: regularises the loss, if there is one.
       generator: on the networks' device, source of all noise.
+      dtype: of products.
     """
-    self._config = config
+    self.target_entropy = config.target_entropy
+    self._max_gradient_norm = optimiser.max_gradient_norm
     self._networks = networks
+    self._prior = prior
     self._generator = generator
-    self._dtype = product_dtype(config.bfloat16)
+    self._dtype = dtype
     self._critic_parameters = list(networks.critics.parameters())
     self._parameters = networks.intentions.trained_parameters()
     self.optimisers = {
       "policy": make_optimiser(
-        self._parameters, config.intention_learning_rate, config.weight_decay
+        self._parameters, config.learning_rate, optimiser.weight_decay
       ),
       "temperature": make_optimiser(
         [networks.log_temperature], config.temperature_learning_rate
       ),
     }
-    self._cloning_terms = CloningTerms(config, networks)
 
-  def fade(self, updates: int) -> None:
-    """Lets the cloning terms fade to what they are after so many updates."""
-    self._cloning_terms.fade(updates)
-
-  def with_fresh_actions(self, batch: Batch) -> Batch:
-    """Gives each example of success an action of its task's intention."""
-    assert batch.owner is not None
-    first = len(batch.action) - batch.examples
-    with torch.no_grad():
-      inputs = batch.inputs[first:].to(self._dtype)
-      action, _ = self._draw(*self._networks.intentions(inputs))
-    rows = torch.arange(batch.examples, device=action.device)
-    own = action[batch.owner[first:], rows]
-    return batch._replace(action=torch.cat([batch.action[:first], own]))
-
-  def update(self, inputs: torch.Tensor, expert: ExpertBatch | None) -> Metrics:
-    """One update of intentions, then of temperatures.
-
-    Args:
-      inputs: [B, O], the replay's.
-      expert: each task's own pairs; None: no BC term.
-
-    Returns:
-      Metrics of the losses.
-    """
+  def update(self, inputs: torch.Tensor) -> Metrics:
+    """One update of intentions, then of temperatures, on inputs [B, O]."""
     networks = self._networks
     inputs = inputs.to(self._dtype)
     with frozen(self._critic_parameters):
@@ -85,19 +64,17 @@ class IntentionLearner:
       features = critic_features
       if networks.intentions.owns_trunk:
         features = networks.intentions.trunk(inputs)
-      mean, deviation = networks.intentions.heads(features)
-      action, log_prob = self._draw(mean, deviation)
+      mean, std = networks.intentions.heads(features)
+      action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
       q = networks.critics.heads(critic_features, action)
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
-    terms, more = self._cloning_terms(expert, inputs, mean, deviation, q)
-    loss, metrics = loss + terms, metrics | more
+    if self._prior is not None:
+      term, more = self._prior(inputs, mean, std, q.detach())
+      loss, metrics = loss + term, metrics | more
     norm = clipped_step(
-      self.optimisers["policy"],
-      loss,
-      self._parameters,
-      self._config.max_gradient_norm,
+      self.optimisers["policy"], loss, self._parameters, self._max_gradient_norm
     )
     saturated = (action.detach().abs() > _SATURATED).float()
     metrics |= {
@@ -107,17 +84,12 @@ class IntentionLearner:
     return metrics | self._update_temperatures(log_prob.detach())
 
   def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
-    config, parameter = self._config, self._networks.log_temperature
-    loss, metrics = temperature_loss(parameter, log_prob, config.target_entropy)
+    parameter = self._networks.log_temperature
+    loss, metrics = temperature_loss(parameter, log_prob, self.target_entropy)
     norm = clipped_step(
       self.optimisers["temperature"],
       loss,
       [parameter],
-      config.max_gradient_norm,
+      self._max_gradient_norm,
     )
     return metrics | {"gradient_norm/temperature": norm}
-
-  def _draw(
-    self, mean: torch.Tensor, deviation: torch.Tensor
-  ) -> tuple[torch.Tensor, torch.Tensor]:
-    return tanh_gaussian.draw(mean, deviation, self._generator)

@@ -8,7 +8,6 @@ SCALAR_METRICS = (
   "loss/value_penalty",
   "loss/policy",
   "loss/temperature",
-  "loss/behaviour_cloning",
   "gradient_norm/discriminator_input",
   "gradient_norm/critic",
   "gradient_norm/policy",
@@ -28,6 +27,5 @@ TASK_METRICS = (
   "temperature",
   "entropy",
   "saturation",  # share of the intention's action floats beyond 0.99
-  "behaviour_cloning",
-  "distance_from_prior",  # squared, of mean actions; or nats, see `bc_loss`
+  "distance_from_prior",  # squared, of mean actions; a divergence: nats
 )

@@ -7,8 +7,8 @@ from typing import TypeVar
 import torch
 from torch import nn
 
-from lfgp_dmc.agents import field_checks
-from lfgp_dmc.agents.lfgp.config import LfgpConfig
+from lfgp_dmc.agents import fields
+from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, LfgpConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork
 from lfgp_dmc.agents.networks.discriminator import Discriminator
@@ -33,18 +33,15 @@ class LfgpNetworks:
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by the names used in checkpoints."""
-    modules: dict[str, nn.Module] = {
+    modules = {
       "intentions": self.intentions,
       "critics": self.critics,
       "target_critics": self.target_critics,
+      "discriminator": self.discriminator,
+      "main_discriminator": self.main_discriminator,
+      "prior": self.prior,
     }
-    if self.discriminator is not None:
-      modules["discriminator"] = self.discriminator
-    if self.main_discriminator is not None:
-      modules["main_discriminator"] = self.main_discriminator
-    if self.prior is not None:
-      modules["prior"] = self.prior
-    return modules
+    return {name: part for name, part in modules.items() if part is not None}
 
 
 def make_networks(
@@ -64,76 +61,63 @@ def make_networks(
     standardiser: raw observation -> input; O is its input size.
     generator: a CPU generator, source of the initial numbers.
     device: where to put the networks.
-
-  Returns:
-    The networks; see `LfgpConfig.owns_trunk`.
   """
-  layout, hidden = config.layout, config.hidden_size
-  observations = standardiser.input_size
-  sizes = (tasks, observations, hidden, actions)
-  trunk = layouts.make_trunk(layout, observations, hidden, generator)
-  critics = CriticNetwork(
-    trunk,
-    layouts.make_critic_heads(
-      layout, *sizes, generator, config.critic_layer_norm
-    ),
+  own = config.networks
+  sizes = (tasks, own.hidden_size, actions, generator)
+  critics = layouts.make_critics(
+    own.layout, standardiser.input_size, *sizes, own.critic_layer_norm
   ).to(device)
-  own = trunk
-  if config.owns_trunk:
-    own = layouts.make_trunk(layout, observations, hidden, generator)
-  intentions = IntentionNetwork(
-    standardiser,
-    own,
-    layouts.make_intention_heads(layout, *sizes, generator),
-    config.owns_trunk,
+  trunk = critics.trunk if own.actor_trunk == "shared" else None
+  intentions = layouts.make_intentions(
+    own.layout, standardiser, *sizes, trunk
   ).to(device)
-  main_discriminator, discriminator = _make_discriminators(
-    config, tasks, actions, standardiser, generator, device
-  )
-  initial = torch.tensor(config.initial_temperature).log()
+  main_discriminator, discriminator = None, None
+  if isinstance(config.reward, DiscriminatorReward):
+    main_discriminator, discriminator = _make_discriminators(
+      config.reward, *sizes, standardiser, device
+    )
+  initial = torch.tensor(config.intention.initial_temperature).log()
   return LfgpNetworks(
     intentions=intentions,
     critics=critics,
     target_critics=_frozen_copy(critics),
     discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
-    prior=_frozen_copy(intentions) if config.prior_weight else None,
+    prior=_frozen_copy(intentions) if config.prior.weight else None,
     main_discriminator=main_discriminator,
   )
 
 
 def _make_discriminators(
-  config: LfgpConfig,
+  config: DiscriminatorReward,
   tasks: int,
+  hidden: int,
   actions: int,
-  standardiser: Standardiser,
   generator: torch.Generator,
+  standardiser: Standardiser,
   device: torch.device,
-) -> tuple[Discriminator | None, Discriminator | None]:
+) -> tuple[Discriminator | None, Discriminator]:
   """The main task's own, if it has one, and that of all other tasks."""
-  if config.reward_source != "discriminator":
-    return None, None
 
-  def make(count: int, unseen: str) -> Discriminator:
+  def make(count: int, masked: str) -> Discriminator:
     return Discriminator(
       count,
       standardiser.input_size,
       actions,
-      config.hidden_size,
+      hidden,
       generator,
-      config.discriminator_input,
-      unseen_inputs(unseen, standardiser),
+      config.input,
+      masked_inputs(masked, standardiser),
     ).to(device)
 
-  if not config.main_discriminator_unseen:
-    return None, make(tasks, config.discriminator_unseen)
+  if not config.main_masked:
+    return None, make(tasks, config.masked)
   if tasks == 1:  # there are no others to be apart from
-    return None, make(1, config.main_discriminator_unseen)
-  main = make(1, config.main_discriminator_unseen)
-  return main, make(tasks - 1, config.discriminator_unseen)
+    return None, make(1, config.main_masked)
+  return make(1, config.main_masked), make(tasks - 1, config.masked)
 
 
-def unseen_inputs(slices: str, standardiser: Standardiser) -> list[int]:
+def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
   """Which network inputs stand for some floats of the observation.
 
   Args:
@@ -144,13 +128,12 @@ def unseen_inputs(slices: str, standardiser: Standardiser) -> list[int]:
     ValueError: the observation has fewer floats.
   """
   size = len(standardiser.mean)
-  chosen = field_checks.positions(slices)
+  chosen = fields.positions(slices)
   if chosen and max(chosen) >= size:
     raise ValueError(
-      f"unseen by a discriminator is {slices}; the observation has {size} "
-      "floats"
+      f"masked of an observation is {slices}; the observation has {size} floats"
     )
-  scales = 2 if standardiser.fine_scale else 1
+  scales = standardiser.input_size // size
   return [scale * size + at for scale in range(scales) for at in chosen]
 
 

@@ -1,11 +1,13 @@
-"""Terms in the intentions' loss that hold them to what was shown or cloned."""
+"""A regulariser of the policy loss: distance from a frozen prior."""
 
+from collections.abc import Sequence
+
+import numpy as np
 import torch
+from absl import logging
 
-from lfgp_dmc.agents import cloning
-from lfgp_dmc.agents.demonstration_pool import ExpertBatch
-from lfgp_dmc.agents.lfgp.config import LfgpConfig
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp.config import PriorConfig
 from lfgp_dmc.agents.losses.behaviour_cloning import (
   behaviour_cloning_loss,
   divergence_loss,
@@ -15,86 +17,101 @@ from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 
 Metrics = dict[str, torch.Tensor]
 
+_ENTROPY_ROWS = 1024  # a task
 
-class CloningTerms:
-  """The BC term, on expert rows, and the prior's, on the replay's rows.
 
-  What is near is what `bc_loss` says: the squared error of the mean action, or
-  the divergence from the prior's distribution. A term's weight fades by
-  `bc_decay` an update and, with `bc_normalise`, is counted in each task's mean
-  |Q|, with which the rest of the loss grows.
+class Prior:
+  """The first intentions, and the weighted distance from them.
+
+  The weight decays with every update and, if normalised, counts in each task's
+  mean |Q|, with which the rest of the loss grows.
   """
 
-  def __init__(self, config: LfgpConfig, networks: LfgpNetworks):
-    """Keeps what is needed."""
+  def __init__(
+    self, config: PriorConfig, network: IntentionNetwork, device: torch.device
+  ):
+    """Keeps the frozen network."""
     self._config = config
-    self._networks = networks
-    self._faded = torch.ones_like(networks.log_temperature[0].detach())
+    self._network = network
+    self._weight = torch.full((), config.weight, device=device)
+
+  def adopt(self, intentions: IntentionNetwork) -> None:
+    """Copies the current intentions into the prior."""
+    self._network.load_state_dict(intentions.state_dict())
 
   def fade(self, updates: int) -> None:
-    """Lets the weights fade to what they are after so many updates."""
-    self._faded.fill_(self._config.bc_decay**updates)
+    """Sets the weight after so many updates."""
+    self._weight.fill_(self._config.weight * self._config.decay**updates)
+
+  def warn_if_precise(
+    self,
+    tasks: Sequence[str],
+    experts: ExpertPool | None,
+    target_entropy: float,
+  ) -> None:
+    """Names the tasks whose prior has less entropy than the target.
+
+    Their temperatures would grow without bound, since the divergence holds the
+    intentions at the prior's entropy.
+
+    Args:
+      tasks: the K tasks.
+      experts: where each is at home; None: nothing is known of that.
+      target_entropy: nats.
+    """
+    if experts is None or self._config.distance != "divergence":
+      return
+    rows = experts.sample(np.random.default_rng(0), _ENTROPY_ROWS).inputs
+    noise = torch.Generator(rows.device).manual_seed(0)
+    values = entropies(self._network, rows, noise).tolist()
+    for task, value in zip(tasks, values, strict=True):
+      if value < target_entropy:
+        logging.warning(
+          "the intention of %s starts with an entropy of %.1f nats, where its "
+          "prior holds it; target_entropy is %.1f, so that its temperature "
+          "will grow without bound: choose a lower one",
+          task,
+          value,
+          target_entropy,
+        )
 
   def __call__(
     self,
-    expert: ExpertBatch | None,
     inputs: torch.Tensor,
     mean: torch.Tensor,
-    deviation: torch.Tensor,
+    std: torch.Tensor,
     q: torch.Tensor,
-  ) -> tuple[torch.Tensor | float, Metrics]:
-    """Adds up the terms that the config asks for.
+  ) -> tuple[torch.Tensor, Metrics]:
+    """The weighted distance.
 
     Args:
-      expert: each task's own pairs; None: no BC term.
       inputs: [B, O], the replay's rows, in the products' dtype.
-      mean: [K, B, A], the intentions' means there, before the tanh.
-      deviation: [K, B, A], their standard deviations, likewise.
-      q: [2, K, B], the critics' values there; no gradient goes into them.
+      mean: [K, B, A], the intentions' there, before the tanh.
+      std: [K, B, A], likewise.
+      q: [2, K, B], the critics' values there, without gradient.
 
     Returns:
-      Their sum, 0.0 if there is none, and metrics by task.
+      The loss, and the unweighted distance by task.
     """
-    config = self._config
-    loss: torch.Tensor | float = 0.0
-    metrics: Metrics = {}
-    if expert is not None and config.bc_weight > 0:
-      shown, shown_deviation = self._networks.intentions(
-        expert.inputs.to(inputs.dtype)
+    with torch.no_grad():
+      prior_mean, prior_std = self._network(inputs)
+    weight = self._weight.expand(len(mean))
+    if self._config.normalise:
+      weight = weight * torch.minimum(q[0], q[1]).abs().mean(-1)
+    if self._config.distance == "divergence":
+      loss, metrics = divergence_loss(mean, std, prior_mean, prior_std, weight)
+    else:
+      loss, metrics = behaviour_cloning_loss(
+        mean, torch.tanh(prior_mean), weight
       )
-      weight = self._weight(config.bc_weight, q)
-      term, more = cloning.cloning_loss(
-        config.bc_loss, shown, shown_deviation, expert.action, weight
-      )
-      loss, metrics = loss + term, more
-    if self._networks.prior is not None:
-      with torch.no_grad():
-        wanted, wanted_deviation = self._networks.prior(inputs)
-      weight = self._weight(config.prior_weight, q)
-      if config.bc_loss == cloning.LIKELIHOOD:
-        term, more = divergence_loss(
-          mean, deviation, wanted, wanted_deviation, weight
-        )
-      else:
-        term, more = behaviour_cloning_loss(mean, torch.tanh(wanted), weight)
-      loss = loss + term
-      metrics["distance_from_prior"] = more["behaviour_cloning"]
-    return loss, metrics
-
-  def _weight(self, weight: float, q: torch.Tensor) -> torch.Tensor:
-    """A term's weight in each task, [K]."""
-    q = q.detach()
-    weights = torch.full_like(q[0, :, 0], weight) * self._faded
-    if self._config.bc_normalise:
-      weights = weights * torch.minimum(q[0], q[1]).abs().mean(-1)
-    return weights
+    return loss, {"distance_from_prior": metrics["behaviour_cloning"]}
 
 
 @torch.no_grad()
 def entropies(
   network: IntentionNetwork, inputs: torch.Tensor, generator: torch.Generator
 ) -> torch.Tensor:
-  """Estimates each intention's entropy where it is at home.
+  """Estimates each intention's entropy on its own task's rows.
 
   Args:
     network: the intentions.
@@ -104,6 +121,6 @@ def entropies(
   Returns:
     [K], mean -log pi, in nats.
   """
-  mean, deviation = network(inputs)
-  _, log_prob = tanh_gaussian.draw(mean, deviation, generator)
+  mean, std = network(inputs)
+  _, log_prob = tanh_gaussian.draw(mean, std, generator)
   return -log_prob.mean(-1)

@@ -7,9 +7,9 @@ from lfgp_dmc.agents.networks import tanh_gaussian
 Metrics = dict[str, torch.Tensor]
 
 # Of the likelihood: actions nearer to 1 than this have a mean at infinity, and
-# what an expert does the same way each time has a deviation that goes to 0.
+# what an expert does the same way each time has a std that goes to 0.
 MOST_ACTION = 0.95
-LEAST_DEVIATION = 0.018  # before the tanh
+LEAST_STD = 0.018  # before the tanh
 # Of the divergence: a policy that explores may be as precise as the prior down
 # to here, or its samples fail where its mean succeeds.
 LEAST_COMPARED = 0.003
@@ -35,10 +35,7 @@ def behaviour_cloning_loss(
 
 
 def likelihood_loss(
-  mean: torch.Tensor,
-  deviation: torch.Tensor,
-  action: torch.Tensor,
-  weight: torch.Tensor | None = None,
+  mean: torch.Tensor, std: torch.Tensor, action: torch.Tensor
 ) -> tuple[torch.Tensor, Metrics]:
   """-log pi(a | s), mean over rows, all tasks equal.
 
@@ -47,47 +44,46 @@ def likelihood_loss(
 
   Args:
     mean: [K, N, A], task k's mean before the tanh, for task k's rows.
-    deviation: [K, N, A], likewise; below `LEAST_DEVIATION` it counts as that.
+    std: [K, N, A], likewise; below `LEAST_STD` it counts as that.
     action: [K, N, A], the expert's; clipped to +-`MOST_ACTION`.
-    weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
 
   Returns:
-    The weighted sum over tasks, and the unweighted loss by task, in nats.
+    The mean over tasks, and the loss by task, in nats.
   """
-  deviation = deviation.clamp(min=LEAST_DEVIATION)
+  std = std.clamp(min=LEAST_STD)
   value = torch.atanh(action.clamp(-MOST_ACTION, MOST_ACTION))
-  noise = (value - mean) / deviation
-  log_prob = tanh_gaussian.log_density(value, deviation, noise)
-  return _over_tasks(-log_prob.mean(-1), weight)
+  noise = (value - mean) / std
+  log_prob = tanh_gaussian.log_density(value, std, noise)
+  return _over_tasks(-log_prob.mean(-1), None)
 
 
 def divergence_loss(
   mean: torch.Tensor,
-  deviation: torch.Tensor,
+  std: torch.Tensor,
   prior_mean: torch.Tensor,
-  prior_deviation: torch.Tensor,
+  prior_std: torch.Tensor,
   weight: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
   """KL(pi || prior), mean over rows, all tasks equal.
 
   That of two Gaussians, as the tanh of both changes nothing. Where the prior
-  is more precise than `LEAST_DEVIATION`, the means' distance counts in units
-  of that, so that the intention can still move; deviations are compared as
+  is more precise than `LEAST_STD`, the means' distance counts in units
+  of that, so that the intention can still move; std are compared as
   they are, down to `LEAST_COMPARED`.
 
   Args:
     mean: [K, N, A], before the tanh.
-    deviation: [K, N, A], likewise.
+    std: [K, N, A], likewise.
     prior_mean: [K, N, A], of what to stay near.
-    prior_deviation: [K, N, A], likewise.
+    prior_std: [K, N, A], likewise.
     weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
 
   Returns:
     The weighted sum over tasks, and the unweighted divergence by task, in
     nats.
   """
-  ratio = deviation / prior_deviation.clamp(min=LEAST_COMPARED)
-  shift = (mean - prior_mean) / prior_deviation.clamp(min=LEAST_DEVIATION)
+  ratio = std / prior_std.clamp(min=LEAST_COMPARED)
+  shift = (mean - prior_mean) / prior_std.clamp(min=LEAST_STD)
   divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
   return _over_tasks(divergence.sum(-1).mean(-1), weight)
 

@@ -44,8 +44,8 @@ def mix(
   Args:
     policy: [B, I].
     expert: [K, N, I].
-    share: from U(0, 1), [K, N, I], a number for every float (released code),
-      or [K, N, 1], one for every row (Gulrajani et al., 2017).
+    share: from U(0, 1), [K, N, I], a number for every float (released code;
+      Gulrajani et al., 2017, draw one for every row).
 
   Returns:
     share * policy + (1 - share) * expert, [K, N, I]; replay rows are reused

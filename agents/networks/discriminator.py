@@ -31,7 +31,7 @@ class Discriminator(nn.Module):
     hidden: int,
     generator: torch.Generator,
     inputs: str = "state_action",
-    unseen: Sequence[int] = (),
+    masked: Sequence[int] = (),
   ):
     """Draws all layers.
 
@@ -42,11 +42,11 @@ class Discriminator(nn.Module):
       hidden: H, units of each hidden layer.
       generator: source of the initial numbers.
       inputs: "state_action" (paper) or "state": the action is not shown.
-      unseen: which of the O floats are not shown either.
+      masked: which of the O floats are not shown either.
     """
     super().__init__()
     self.sees_action = inputs == "state_action"
-    seen = torch.tensor(sorted({*range(observations)} - {*unseen}))
+    seen = torch.tensor(sorted({*range(observations)} - {*masked}))
     self.register_buffer("seen", seen, persistent=False)
     self.sees_all = len(seen) == observations
     size = len(seen) + (actions if self.sees_action else 0)

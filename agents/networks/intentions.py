@@ -9,11 +9,11 @@ from torch.nn import functional
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
-DEVIATION_FLOOR = 1e-7  # the paper's epsilon against underflow
+STD_FLOOR = 1e-7  # the paper's epsilon against underflow
 
 
 class IntentionHeads(nn.Module):
-  """K heads -> H ReLU (once or twice) -> 2A: mean and raw deviation."""
+  """K heads -> H ReLU (once or twice) -> 2A: mean and raw std."""
 
   def __init__(
     self,
@@ -57,14 +57,10 @@ class IntentionHeads(nn.Module):
       hidden = self.second(hidden).relu_()
     return split(self.output(hidden))
 
-  def set_deviation(self, deviation: float) -> None:
-    """Gives all intentions one standard deviation (before the tanh) at first.
-
-    Args:
-      deviation: above 0.
-    """
+  def set_std(self, std: float) -> None:
+    """Gives all intentions one std, before the tanh, whatever the input."""
     actions = self.output.weight.shape[-1] // 2
-    raw = math.log(math.expm1(deviation))  # softplus(raw) = deviation
+    raw = math.log(math.expm1(std))  # softplus(raw) = std
     with torch.no_grad():
       self.output.weight[..., actions:] = 0.0
       self.output.bias[..., actions:] = raw
@@ -72,7 +68,7 @@ class IntentionHeads(nn.Module):
   def one(
     self, features: torch.Tensor, task: int
   ) -> tuple[torch.Tensor, torch.Tensor]:
-    """One task's Gaussian for features [B, H]: mean, raw deviation [B, A]."""
+    """One task's Gaussian for features [B, H]: mean, raw std [B, A]."""
     hidden = self.hidden.one(features, task).relu_()
     if self.second is not None:
       hidden = self.second.one(hidden, task).relu_()
@@ -80,15 +76,15 @@ class IntentionHeads(nn.Module):
     return mean, raw
 
 
-def to_deviation(raw: torch.Tensor) -> torch.Tensor:
+def to_std(raw: torch.Tensor) -> torch.Tensor:
   """softplus(raw) + 1e-7: a standard deviation, with no other clamp."""
-  return functional.softplus(raw) + DEVIATION_FLOOR
+  return functional.softplus(raw) + STD_FLOOR
 
 
 def split(output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-  """Splits a head's [..., 2A] into mean and deviation, float32 [..., A]."""
+  """Splits a head's [..., 2A] into mean and std, float32 [..., A]."""
   mean, raw = output.float().chunk(2, dim=-1)
-  return mean, to_deviation(raw)
+  return mean, to_std(raw)
 
 
 class IntentionNetwork(nn.Module):
@@ -129,5 +125,5 @@ class IntentionNetwork(nn.Module):
       return self.trunk(inputs)
 
   def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Mean and deviation [K, B, A] for inputs [B, O] or [K, B, O]."""
+    """Mean and std [K, B, A] for inputs [B, O] or [K, B, O]."""
     return self.heads(self.features(inputs))

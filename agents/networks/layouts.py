@@ -9,64 +9,72 @@ K = 1 the intention is O-H-H-2A, each critic (O + A)-H-H-1.
 import torch
 from torch import nn
 
-from lfgp_dmc.agents.networks.critics import TwinCriticHeads
-from lfgp_dmc.agents.networks.intentions import IntentionHeads
-from lfgp_dmc.agents.networks.trunk import Trunk
+from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
+from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
+from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
 
 SHARED_TRUNK, SEPARATE = "shared_trunk", "separate"
 LAYOUTS = (SHARED_TRUNK, SEPARATE)
 
 
-def make_trunk(
-  layout: str, observations: int, hidden: int, generator: torch.Generator
-) -> nn.Module:
-  """The layers before the heads: inputs [..., O] -> features [..., O or H].
-
-  Args:
-    layout: a name in `LAYOUTS`.
-    observations: O.
-    hidden: H.
-    generator: source of the initial numbers.
-  """
-  if layout == SEPARATE:
-    return nn.Identity()
-  return Trunk(observations, hidden, generator)
-
-
-def make_intention_heads(
+def make_intentions(
   layout: str,
+  standardiser: Standardiser,
   tasks: int,
-  observations: int,
   hidden: int,
   actions: int,
   generator: torch.Generator,
-) -> IntentionHeads:
-  """The K heads that fit `make_trunk`'s features; arguments likewise."""
-  features, layers = _of_heads(layout, observations, hidden)
-  return IntentionHeads(tasks, features, hidden, actions, generator, layers)
+  critics_trunk: nn.Module | None = None,
+) -> IntentionNetwork:
+  """Draws K intentions.
+
+  Args:
+    layout: a name in `LAYOUTS`.
+    standardiser: raw observation -> input.
+    tasks: K.
+    hidden: H.
+    actions: A.
+    generator: source of the initial numbers.
+    critics_trunk: the trunk to share; None: one of their own.
+  """
+  inputs = standardiser.input_size
+  trunk = critics_trunk or _make_trunk(layout, inputs, hidden, generator)
+  features, layers = _of_heads(layout, inputs, hidden)
+  heads = IntentionHeads(tasks, features, hidden, actions, generator, layers)
+  return IntentionNetwork(standardiser, trunk, heads, critics_trunk is None)
 
 
-def make_critic_heads(
+def make_critics(
   layout: str,
+  inputs: int,
   tasks: int,
-  observations: int,
   hidden: int,
   actions: int,
   generator: torch.Generator,
   layer_norm: bool = False,
-) -> TwinCriticHeads:
-  """The 2K heads that fit `make_trunk`'s features; arguments likewise."""
-  features, layers = _of_heads(layout, observations, hidden)
-  return TwinCriticHeads(
+) -> CriticNetwork:
+  """Draws 2K critics; arguments as of `make_intentions`."""
+  trunk = _make_trunk(layout, inputs, hidden, generator)
+  features, layers = _of_heads(layout, inputs, hidden)
+  heads = TwinCriticHeads(
     tasks, features, hidden, actions, generator, layer_norm, layers
   )
+  return CriticNetwork(trunk, heads)
 
 
 def layout_of(heads: IntentionHeads) -> str:
-  """The layout that `make_intention_heads` made these heads for."""
+  """The layout that `make_intentions` made these heads for."""
   return SHARED_TRUNK if heads.second is None else SEPARATE
 
 
-def _of_heads(layout: str, observations: int, hidden: int) -> tuple[int, int]:
+def _make_trunk(
+  layout: str, inputs: int, hidden: int, generator: torch.Generator
+) -> nn.Module:
+  if layout == SEPARATE:
+    return nn.Identity()
+  return Trunk(inputs, hidden, generator)
+
+
+def _of_heads(layout: str, inputs: int, hidden: int) -> tuple[int, int]:
   """A head's inputs, and its hidden layers."""
-  return (observations, 2) if layout == SEPARATE else (hidden, 1)
+  return (inputs, 2) if layout == SEPARATE else (hidden, 1)

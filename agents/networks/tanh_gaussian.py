@@ -15,21 +15,21 @@ def log_one_minus_tanh_squared(value: torch.Tensor) -> torch.Tensor:
 
 
 def log_density(
-  value: torch.Tensor, deviation: torch.Tensor, noise: torch.Tensor
+  value: torch.Tensor, std: torch.Tensor, noise: torch.Tensor
 ) -> torch.Tensor:
   """The log density of the actions tanh(value), summed over A.
 
   Args:
     value: [..., A], before the tanh.
-    deviation: [..., A], standard deviation, above 0.
-    noise: [..., A], (value - mean) / deviation.
+    std: [..., A], standard deviation, above 0.
+    noise: [..., A], (value - mean) / std.
 
   Returns:
     [...], in nats.
   """
   log_prob = (
     -0.5 * noise * noise
-    - torch.log(deviation)
+    - torch.log(std)
     - _LOG_SQRT_2_PI
     - log_one_minus_tanh_squared(value)
   )
@@ -37,26 +37,26 @@ def log_density(
 
 
 def sample(
-  mean: torch.Tensor, deviation: torch.Tensor, noise: torch.Tensor
+  mean: torch.Tensor, std: torch.Tensor, noise: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
   """Draws actions by the reparameterisation trick.
 
   Args:
     mean: [..., A], before the tanh.
-    deviation: [..., A], standard deviation, above 0.
+    std: [..., A], standard deviation, above 0.
     noise: [..., A], from N(0, 1).
 
   Returns:
-    The actions tanh(mean + deviation * noise), [..., A] within [-1, 1], and
+    The actions tanh(mean + std * noise), [..., A] within [-1, 1], and
     their log densities, [...].
   """
-  value = mean + deviation * noise
-  return torch.tanh(value), log_density(value, deviation, noise)
+  value = mean + std * noise
+  return torch.tanh(value), log_density(value, std, noise)
 
 
 def draw(
-  mean: torch.Tensor, deviation: torch.Tensor, generator: torch.Generator
+  mean: torch.Tensor, std: torch.Tensor, generator: torch.Generator
 ) -> tuple[torch.Tensor, torch.Tensor]:
   """Draws the noise too; see `sample`."""
   noise = torch.randn(mean.shape, generator=generator, device=mean.device)
-  return sample(mean, deviation, noise)
+  return sample(mean, std, noise)

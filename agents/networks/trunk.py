@@ -3,68 +3,56 @@
 import numpy as np
 import torch
 from torch import nn
-from torch.nn import functional
 
 from lfgp_dmc.agents.networks.linear import make_linear
 
+# Floor on the std used, in the observation's unit: floats that hardly move are
+# not blown up.
+_STD_FLOOR = 0.01
+
 
 class Standardiser(nn.Module):
-  """Maps raw observations to network inputs: (x - mean) / deviation.
+  """Maps raw observations to network inputs: (x - mean) / std.
 
-  With a fine scale c, tanh(x / c) follows for every float: what differs by
-  millimetres near 0, such as a block from its slot, is told apart there, while
-  (x - mean) / deviation tells centimetres. With the absorbing flag of the
-  released code's wrapper, a 0 comes last: its episodes end by time alone, so
-  that no state is ever absorbing.
+  With a tanh feature scale c, tanh(x / c) follows for every float: it resolves
+  millimetres near 0, such as a block in its slot, where (x - mean) / std
+  resolves centimetres.
   """
 
   mean: torch.Tensor
-  deviation: torch.Tensor
+  deviation: torch.Tensor  # the std, by its name in stored policies
 
-  def __init__(
-    self, size: int, absorbing_flag: bool = False, fine_scale: float = 0.0
-  ):
-    """Starts as the identity, what the fine scale adds apart.
+  def __init__(self, size: int, tanh_feature_scale: float = 0.0):
+    """Starts as the identity, tanh features apart.
 
     Args:
       size: O, floats of an observation.
-      absorbing_flag: whether inputs get one more float, 0.
-      fine_scale: c, in the observations' own units; 0: no fine floats.
+      tanh_feature_scale: c, in the observations' own units; 0: none.
     """
     super().__init__()
-    self.absorbing_flag = absorbing_flag
-    self.fine_scale = fine_scale
+    self.tanh_feature_scale = tanh_feature_scale
     self.register_buffer("mean", torch.zeros(size))
     self.register_buffer("deviation", torch.ones(size))
 
-  def fit(self, observation: np.ndarray, floor: float) -> None:
-    """Takes mean and deviation from demonstrations.
-
-    Args:
-      observation: [N, O].
-      floor: smallest deviation used, in the observation's own units; it keeps
-        floats that hardly move from being blown up.
-    """
+  def fit(self, observation: np.ndarray) -> None:
+    """Takes mean and std, at least 0.01, from demonstrations [N, O]."""
     mean = observation.mean(0, dtype=np.float64)
-    deviation = np.maximum(observation.std(0, dtype=np.float64), floor)
+    std = np.maximum(observation.std(0, dtype=np.float64), _STD_FLOOR)
     self.mean.copy_(torch.from_numpy(mean))
-    self.deviation.copy_(torch.from_numpy(deviation))
+    self.deviation.copy_(torch.from_numpy(std))
 
   def forward(self, observation: torch.Tensor) -> torch.Tensor:
-    """Returns [..., input_size]: standardised, fine, flag."""
+    """Returns [..., input_size]: standardised, then tanh features."""
     inputs = (observation - self.mean) / self.deviation
-    if self.fine_scale:
-      fine = torch.tanh(observation / self.fine_scale)
-      inputs = torch.cat([inputs, fine], dim=-1)
-    if self.absorbing_flag:
-      inputs = functional.pad(inputs, (0, 1))
+    if self.tanh_feature_scale:
+      features = torch.tanh(observation / self.tanh_feature_scale)
+      inputs = torch.cat([inputs, features], dim=-1)
     return inputs
 
   @property
   def input_size(self) -> int:
-    """Floats that a network gets: O, or 2 O, and 1 more with the flag."""
-    size = self.mean.shape[0]
-    return size + size * bool(self.fine_scale) + self.absorbing_flag
+    """Floats that a network gets: O, or 2 O with tanh features."""
+    return len(self.mean) * (2 if self.tanh_feature_scale else 1)
 
 
 class Trunk(nn.Module):

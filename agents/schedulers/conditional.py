@@ -73,12 +73,11 @@ TABLES: dict[str, dict[str, Row]] = {
 }
 
 
-def table_for(tasks: Sequence[str], main_index: int) -> np.ndarray:
+def table_for(tasks: Sequence[str]) -> np.ndarray:
   """The published table of a main task.
 
   Args:
-    tasks: names of the K tasks.
-    main_index: the main task's place.
+    tasks: names of the K tasks, the main task first.
 
   Returns:
     float64 [K + 1, K], rows sum to 1: next task by last task; the last row is
@@ -87,7 +86,7 @@ def table_for(tasks: Sequence[str], main_index: int) -> np.ndarray:
   Raises:
     ValueError: there is no table for the main task, or not for all tasks.
   """
-  main = tasks[main_index]
+  main = tasks[0]
   if main not in TABLES:
     raise ValueError(
       f"no conditional table for main task {main!r}; valid: {', '.join(TABLES)}"

@@ -27,14 +27,11 @@ INSERT_SEQUENCES: tuple[tuple[str, ...], ...] = (
 )
 
 
-def sequences_for(
-  tasks: Sequence[str], main_index: int
-) -> list[tuple[int, ...]]:
+def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
   """The handcrafted sequences of a task set, as indices.
 
   Args:
-    tasks: names of the K tasks.
-    main_index: the main task's place.
+    tasks: names of the K tasks, the main task first.
 
   Returns:
     Sequences of eight indices; two more if `bring` is an auxiliary task.
@@ -43,7 +40,7 @@ def sequences_for(
     ValueError: the set lacks a task that the sequences name.
   """
   names = {name: index for index, name in enumerate(tasks)}
-  main = tasks[main_index]
+  main = tasks[0]
   has_bring = "bring" in names and main != "bring"
   wanted = SEQUENCES + (INSERT_SEQUENCES if has_bring else ())
   needed = {name for sequence in wanted for name in sequence} - {MAIN}
@@ -53,7 +50,7 @@ def sequences_for(
       f"the handcrafted scheduler needs {', '.join(missing)} among the tasks; "
       f"got {', '.join(tasks)}"
     )
-  names[MAIN] = main_index
+  names[MAIN] = 0
   return [tuple(names[name] for name in sequence) for sequence in wanted]
 
 

@@ -51,16 +51,15 @@ class WeightedRandom:
     )
 
 
-def main_weights(tasks: int, main_index: int, weight: float) -> np.ndarray:
-  """The main task's weight, the rest shared equally; float64 [K].
+def main_weights(tasks: int, weight: float) -> np.ndarray:
+  """The first task's weight, the rest shared equally; float64 [K].
 
   Args:
     tasks: K.
-    main_index: the main task's place.
     weight: probability of the main task, 0..1; 1 if it is the only task.
   """
   if tasks == 1:
     return np.ones(1)
   weights = np.full(tasks, (1 - weight) / (tasks - 1))
-  weights[main_index] = weight
+  weights[0] = weight
   return weights

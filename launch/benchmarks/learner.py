@@ -10,6 +10,8 @@ import torch
 
 from lfgp_dmc import observations, task_names
 from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.lfgp.config import PretrainingConfig
 from lfgp_dmc.launch.benchmarks.operations import gflop_of_update
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
@@ -36,6 +38,7 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     over the third, median of the rounds' own; `share_<part>_...`: of the time.
   """
   tasks = tasks_of(config)
+  assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   terms = gflop_of_update(
     config.agent, len(tasks), observations.OBSERVATION_SIZE, _ACTION_SIZE
   )
@@ -86,21 +89,19 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
   """The config's agent on made-up demonstrations.
 
   Args:
-    config: a run's; without warm start.
+    config: a run's; without its pretraining.
     replay: where its transitions are; None makes some up.
     bfloat16: overrides the config's.
   """
-  changes = {"bc_warm_start_updates": 0}
-  if bfloat16 is not None:
-    changes["bfloat16"] = bfloat16
   tasks = tasks_of(config)
+  assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   size = observations.OBSERVATION_SIZE
   if replay is None:
     rows = synthetic.transitions(_ROWS, size, _ACTION_SIZE)
     rewards = np.zeros((_ROWS, len(tasks)), np.float32)  # for SAC-X
-    replay = synthetic.ArrayReplay(rows, rewards, tasks)
+    replay = synthetic.replay(rows, rewards, tasks)
   return ALGORITHMS[config.algorithm].build(
-    dataclasses.replace(config.agent, **changes),
+    dataclasses.replace(config.agent, pretraining=PretrainingConfig()),
     tasks,
     synthetic.demonstrations(tasks, _PAIRS, size, _ACTION_SIZE),
     replay,
@@ -108,6 +109,7 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
     torch.device("cpu"),
     size,
     _ACTION_SIZE,
+    bfloat16=config.bfloat16 if bfloat16 is None else bfloat16,
   )
 
 
@@ -122,9 +124,8 @@ def time_shares(agent, seconds: float) -> dict[str, float]:
     "sampling": (agent.batches, "draw"),
     "critics": (learner.critics, "update"),
     "intentions": (learner.intentions, "update"),
+    "reward": (learner.reward, "update"),
   }
-  if learner.discriminators is not None:
-    parts["discriminator"] = (learner.discriminators, "update")
 
   def timed(part: str, call: Callable) -> Callable:
     def wrapped(*arguments):
@@ -140,6 +141,8 @@ def time_shares(agent, seconds: float) -> dict[str, float]:
   start = time.perf_counter()
   rate(agent.update, seconds)
   total = time.perf_counter() - start
+  for owner, name in parts.values():
+    delattr(owner, name)  # the class's own again
   spent["rest"] = total - sum(spent.values())
   return {part: value / total for part, value in spent.items()}
 

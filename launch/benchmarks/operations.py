@@ -7,6 +7,7 @@ twice, six times its forward pass.
 """
 
 from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.lfgp.config import DiscriminatorReward
 from lfgp_dmc.agents.networks import layouts
 
 
@@ -24,19 +25,14 @@ def gflop_of_update(
   Returns:
     Term -> GFLOP; the sum is what the update needs.
   """
-  hidden, rows = config.hidden_size, config.batch_size
+  hidden, rows = config.networks.hidden_size, config.batch_size
   shared = observations * hidden + hidden * hidden
-  if config.layout == layouts.SEPARATE:
+  if config.networks.layout == layouts.SEPARATE:
     trunk, before = 0, shared  # each head has these layers itself
   else:
     trunk, before = shared, hidden * hidden
   intention = before + hidden * 2 * actions
   critic = before + actions * hidden + hidden
-  seen = observations
-  if config.discriminator_input == "state_action":
-    seen += actions
-  discriminator = seen * hidden + hidden * hidden + hidden * tasks
-  mixed = tasks * config.discriminator_batch_size
 
   def gflop(multiplications: float, count: int) -> float:
     return 2e-9 * multiplications * count
@@ -50,7 +46,12 @@ def gflop_of_update(
     "intentions": gflop(intention, 3 * tasks * rows),
     "critics_of_intentions": gflop(critic, 2 * 2 * tasks * rows),
   }
-  if config.reward_source == "discriminator":
+  if isinstance(config.reward, DiscriminatorReward):
+    seen = observations
+    if config.reward.input == "state_action":
+      seen += actions
+    discriminator = seen * hidden + hidden * hidden + hidden * tasks
+    mixed = tasks * config.reward.batch_size
     terms["discriminator"] = gflop(discriminator, 3 * (rows + mixed))
     terms["gradient_penalty"] = gflop(discriminator, 6 * mixed)
   return terms

@@ -71,7 +71,7 @@ def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
     env_steps=env_steps,
     log_every=config.log_every,
     warmup_steps=_EPISODE + 1,
-    updates_per_step=config.agent.updates_per_step,
+    updates_per_step=config.updates_per_step,
     progress_bar=False,
   )
   with tempfile.TemporaryDirectory() as folder:

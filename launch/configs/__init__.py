@@ -1,9 +1,13 @@
-"""What a run is told: defaults, presets, and the checked, frozen result."""
+"""The config of a run: defaults, presets, and the checked, frozen result."""
 
 from lfgp_dmc.launch.configs.algorithms import ALGORITHMS, Algorithm
 from lfgp_dmc.launch.configs.presets import PRESETS
 from lfgp_dmc.launch.configs.resolve import (
+  KIND,
+  fill,
+  flattened,
   from_dict,
+  hint,
   make_config,
   to_run_config,
 )
@@ -11,10 +15,14 @@ from lfgp_dmc.launch.configs.run_config import RunConfig
 
 __all__ = [
   "ALGORITHMS",
+  "KIND",
   "PRESETS",
   "Algorithm",
   "RunConfig",
+  "fill",
+  "flattened",
   "from_dict",
+  "hint",
   "make_config",
   "to_run_config",
 ]

@@ -15,18 +15,13 @@ class Algorithm:
   """How an algorithm is made from a run's config."""
 
   summary: str
-  agent_config: type  # a frozen dataclass with defaults for every field
+  agent_config: type[LfgpConfig] | type[BcConfig]
   build: Callable[..., ActingAgent | SupervisedAgent]  # see `lfgp.build`
+  # Config fields by dotted name, and groups that presets leave alone.
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+  without: tuple[str, ...] = ()
   is_multitask: bool = True  # learns all of `task_set`, or the main task alone
-  is_supervised: bool = (
-    False  # by `lfgp_dmc/runs/supervised.py`, without acting
-  )
-  run_defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-
-  def make_agent_config(self) -> Any:
-    """The agent's config with this algorithm's defaults."""
-    return self.agent_config(**self.defaults)
+  is_supervised: bool = False  # without acting; see `runs/supervised.py`
 
 
 _CLONING = {"checkpoint_every": 5_000}  # updates; its checkpoints are small
@@ -41,59 +36,48 @@ ALGORITHMS: dict[str, Algorithm] = {
     "the same without a scheduler: only the main intention acts",
     LfgpConfig,
     lfgp.build,
-    defaults={"scheduler": "main_only"},
+    {"agent.scheduler.kind": "main_only"},
   ),
   "dac": Algorithm(
     "Discriminator-Actor-Critic: the main task alone, separate networks",
     LfgpConfig,
     lfgp.build,
-    defaults={"scheduler": "main_only", "layout": "separate"},
+    {"agent.scheduler.kind": "main_only", "agent.networks.layout": "separate"},
     is_multitask=False,
   ),
   "sacx": Algorithm(
     "SAC-X on the dense rewards of all tasks: the paper's experts",
     LfgpConfig,
     lfgp.build,
-    defaults={
-      "reward_source": "replay",
-      "scheduler": "conditional_weighted",
-      "warm_up": 10_000,
+    {
+      "agent.reward.kind": "stored",
+      "agent.scheduler.kind": "conditional_weighted",
       "random_steps": 0,
-      # Nothing that needs demonstrations, or that fits other rewards.
-      "reward_clip": 0.0,
-      "reward_scale": 1.0,
-      "expert_share": 0.0,
-      "bc_weight": 0.0,
-      "bc_warm_start_updates": 0,
-      "prior_weight": 0.0,
-      "standardise": False,
-      "discriminator_noise": 0.0,
+      "warm_up": 10_000,
     },
+    without=("inputs", "pretraining", "prior"),  # which take demonstrations
   ),
   "bc": Algorithm(
     "behaviour cloning of the main task alone",
     BcConfig,
     bc.build,
-    defaults={"layout": "separate"},
+    {**_CLONING, "agent.networks.layout": "separate"},
     is_multitask=False,
     is_supervised=True,
-    run_defaults=_CLONING,
   ),
   "bc_less": Algorithm(
     "the same with less data: a multitask method's pairs of the main task",
     BcConfig,
     bc.build,
-    defaults={"layout": "separate"},
+    {**_CLONING, "agent.networks.layout": "separate", "pairs_per_task": 9000},
     is_multitask=False,
     is_supervised=True,
-    run_defaults={**_CLONING, "pairs_per_task": 9000},
   ),
   "multitask_bc": Algorithm(
     "behaviour cloning of all tasks, with a shared trunk",
     BcConfig,
     bc.build,
-    defaults={"layout": "shared_trunk"},
+    {**_CLONING, "agent.networks.layout": "shared_trunk"},
     is_supervised=True,
-    run_defaults=_CLONING,
   ),
 }

@@ -1,9 +1,11 @@
-"""Named changes to the defaults, by the dotted names of config fields."""
+"""Named changes to the defaults, by the dotted names of config fields.
+
+The hyper-parameter tables of the paper are the defaults themselves. A preset
+that changes a field of `agent.reward` or `agent.scheduler` names its kind too:
+with another kind, those changes are left out.
+"""
 
 from typing import Any
-
-# The hyper-parameter tables of the paper are the defaults of the dataclasses.
-_PAPER: dict[str, Any] = {}
 
 # The authors' later journal version. Its data, 1000 pairs a task of which 200
 # are extra rows of success, is a matter of collection:
@@ -11,15 +13,16 @@ _PAPER: dict[str, Any] = {}
 #       --final_pairs=200 --output=data/stack_ral
 # It trains for 2 M steps, Insert for 4 M: --config.env_steps=2000000.
 _RAL: dict[str, Any] = {
-  "agent.discriminator_final_share": 0.95,
-  "agent.expert_share": 0.1,
-  "agent.expert_share_decay": 0.99999,
-  "agent.initial_temperature": 0.01,
-  "agent.polyak": 1e-4,
-  "agent.random_steps": 50_000,
-  "agent.scheduler": "weighted_random_handcrafted",
-  "agent.warm_up": 25_000,
-  "agent.weight_decay": 0.01,
+  "random_steps": 50_000,
+  "warm_up": 25_000,
+  "agent.critic.polyak": 1e-4,
+  "agent.intention.initial_temperature": 0.01,
+  "agent.optimiser.weight_decay": 0.01,
+  "agent.reward.kind": "discriminator",
+  "agent.reward.expert_share": 0.1,
+  "agent.reward.expert_share_decay": 0.99999,
+  "agent.reward.final_share": 0.95,
+  "agent.scheduler.kind": "weighted_random_handcrafted",
 }
 
 # Ours: the fewest hours on two cores to the same success, from runs and trials
@@ -28,39 +31,77 @@ _RAL: dict[str, Any] = {
 # stay near it; discriminators tell where a task ends, and from positions alone,
 # since velocities and history tell whose success it is.
 _FAST: dict[str, Any] = {
+  "bfloat16": True,
   "control_hz": 5,
-  "agent.actor_trunk": "own",
+  "random_steps": 0,
+  "warm_up": 1800,
   "agent.batch_size": 128,
-  "agent.bc_normalise": True,
-  "agent.bc_warm_start_updates": 10_000,
-  "agent.bfloat16": True,
-  "agent.cloned_deviation": 0.1,
-  "agent.critic_layer_norm": True,
-  "agent.discount": 0.97,
-  "agent.discriminator_batch_size": 32,
-  "agent.discriminator_final_share": 1.0,
-  "agent.discriminator_input": "state",
-  "agent.discriminator_noise": 0.3,
-  "agent.discriminator_unseen": "3:6,8:12,26:38,53:59",
-  "agent.episode_steps": 90,
-  "agent.expert_share": 0.25,
-  "agent.initial_temperature": 0.0003,
-  "agent.intention_delay": 3000,
-  "agent.intention_learning_rate": 1e-4,
-  "agent.polyak": 0.01,
-  "agent.prior_weight": 5.0,
-  "agent.random_steps": 0,
-  "agent.reward": "gail",
-  "agent.reward_clip": 5.0,
-  "agent.reward_scale": 0.2,
-  "agent.scheduler": "weighted_random",
-  "agent.standardise": True,
-  "agent.temperature_learning_rate": 0.001,
-  "agent.warm_up": 1800,
+  "agent.critic.discount": 0.97,
+  "agent.critic.polyak": 0.01,
+  "agent.critic.warmup_updates": 3000,
+  "agent.inputs.standardise": True,
+  "agent.intention.initial_temperature": 0.0003,
+  "agent.intention.learning_rate": 1e-4,
+  "agent.intention.temperature_learning_rate": 0.001,
+  "agent.networks.actor_trunk": "own",
+  "agent.networks.critic_layer_norm": True,
+  "agent.pretraining.std": 0.1,
+  "agent.pretraining.updates": 10_000,
+  "agent.prior.normalise": True,
+  "agent.prior.weight": 5.0,
+  "agent.reward.kind": "discriminator",
+  "agent.reward.batch_size": 32,
+  "agent.reward.clip": 5.0,
+  "agent.reward.expert_share": 0.25,
+  "agent.reward.final_share": 1.0,
+  "agent.reward.form": "gail",
+  "agent.reward.input": "state",
+  "agent.reward.masked": "3:6,8:12,26:38,53:59",
+  "agent.reward.noise": 0.3,
+  "agent.reward.scale": 0.2,
+  "agent.scheduler.kind": "weighted_random",
+}
+
+# Where millimetres decide (Bring, Insert): cloning by likelihood, a divergence
+# as the prior (which has an entropy term of its own: the temperature is to
+# vanish), and a discriminator for the main task alone that sees blue and the
+# fingers.
+_FAST_PRECISE: dict[str, Any] = {
+  **_FAST,
+  "env_steps": 40_000,
+  "mirror_demonstrations": True,
+  "replay_capacity": 40_000,
+  "updates_per_step": 0.5,
+  "agent.critic.warmup_updates": 4000,
+  "agent.intention.learning_rate": 0.00003,
+  "agent.intention.target_entropy": -30.0,
+  "agent.pretraining.learning_rate": 0.001,
+  "agent.pretraining.loss": "likelihood",
+  "agent.pretraining.std": 0.0,
+  "agent.pretraining.updates": 30_000,
+  "agent.prior.decay": 0.99998,
+  "agent.prior.distance": "divergence",
+  "agent.prior.weight": 0.1,
+  "agent.reward.expert_share": 0.5,
+  "agent.reward.main_masked": "0:6,8:12,19:47,50:59",
+  "agent.scheduler.main_weight": 0.7,
+  "agent.scheduler.xi": 90,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {
-  "paper": _PAPER,
+  "paper": {},
   "ral": _RAL,
   "fast": _FAST,
+  "fast_precise": _FAST_PRECISE,
+}
+
+# What a main task changes of a preset: half a millimetre decides Insert.
+OF_TASK: dict[tuple[str, str], dict[str, Any]] = {
+  ("fast_precise", "insert"): {
+    "bfloat16": False,
+    "env_steps": 80_000,
+    "replay_capacity": 80_000,
+    "agent.inputs.tanh_feature_scale": 0.01,  # m
+    "agent.intention.learning_rate": 0.00001,
+  },
 }

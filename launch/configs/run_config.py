@@ -1,14 +1,27 @@
-"""Every setting of a run but the agent's own, checked when it is made."""
+"""Every setting of a run but the agent's own."""
 
 import dataclasses
 from typing import Any
 
-from lfgp_dmc.launch.configs import algorithms
+from pydantic import model_validator
+
+from lfgp_dmc.agents.bc import BcConfig
+from lfgp_dmc.agents.fields import (
+  Count,
+  Positive,
+  PositiveInt,
+  Switch,
+  Text,
+  checked,
+)
+from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
+EPISODE_SECONDS = 18  # of the block tasks
 
-@dataclasses.dataclass(frozen=True, kw_only=True)
+
+@checked
 class RunConfig:
   """One run, whatever its algorithm; steps are environment steps.
 
@@ -16,83 +29,90 @@ class RunConfig:
   and flags change them, and `config.json` of the run holds the result.
   """
 
-  algorithm: str = "lfgp"
-  main_task: str = "stack"
-  seed: int = 0
-  env_steps: int = 4_000_000
+  algorithm: Text = "lfgp"
+  main_task: Text = "stack"
+  seed: Count = 0
+  env_steps: PositiveInt = 4_000_000
 
   # Demonstrations.
-  demonstrations: str = ""  # dataset folder: a file a task
-  pairs_per_task: int = 0  # use the first so many of each file; 0: all
-  mirror_demonstrations: bool = False  # and as many mirror images of them
-  collect_pairs: int = 0  # collect so many a task if there is no folder
+  demonstrations: Text = ""  # dataset folder: a file a task
+  pairs_per_task: Count = 0  # use the first so many of each file; 0: all
+  mirror_demonstrations: Switch = False  # and as many mirror images of them
+  collect_pairs: Count = 0  # collect so many a task if there is no folder
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
-  environment: str = ""
-  control_hz: int = 20  # of the block tasks: 20, 10 or 5 steps a second
+  environment: Text = ""
+  control_hz: PositiveInt = 20  # of the block tasks: 20, 10 or 5 steps a second
+  episode_steps: Count = 0  # at most; 0: 18 s
 
-  # Another run: its networks, by task name, and its replay are taken over.
-  transfer_from: str = ""
+  # Acting and updates; not of behaviour cloning.
+  warm_up: PositiveInt = 1000  # transitions before the first update
+  random_steps: Count = 1000  # first steps with actions from U[-1, 1]
+  updates_per_step: Positive = 1.0  # the training loop holds this ratio
+
+  # Other runs. One of the first: its networks, by task name, and its replay are
+  # taken over. Of the second, a policy folder: its intentions alone.
+  transfer_from: Text = ""
+  transfer_updates: Count = 1000  # before the first step, if a task is new
+  init_from: Text = ""
 
   # When things happen.
-  log_every: int = 500
-  evaluate_every: int = 100_000
-  checkpoint_every: int = 20_000
-  evaluate_first: bool = False  # also the untrained agent
+  log_every: PositiveInt = 500
+  evaluate_every: PositiveInt = 100_000
+  checkpoint_every: PositiveInt = 20_000
+  evaluate_first: Switch = False  # also the untrained agent
 
   # Evaluation: every intention, mean action, the same resets for all runs.
-  evaluation_episodes: int = 50  # a task
-  evaluation_seed: int = 0
-  evaluation_workers: int = 0  # processes; 0: one a core
+  evaluation_episodes: PositiveInt = 50  # a task
+  evaluation_seed: Count = 0
+  evaluation_workers: Count = 0  # processes; 0: one a core
 
   # Resources.
-  replay_capacity: int = 4_000_000  # transitions
-  device: str = "auto"  # cpu, cuda, ...; auto: cuda where there is one
-  threads: int = 1  # of torch; 0: one a core that this process may use
-  deterministic: bool = False  # the same numbers again, after a resume too
+  replay_capacity: PositiveInt = 4_000_000  # transitions
+  device: Text = "auto"  # cpu, cuda, ...; auto: cuda where there is one
+  threads: Count = 1  # of torch; 0: one a core that this process may use
+  bfloat16: Switch = False  # products in bfloat16; parameters stay float32
+  cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
+  deterministic: Switch = False  # the same numbers again, after a resume too
 
-  agent: Any = None  # the dataclass of the algorithm's own settings
+  agent: LfgpConfig | BcConfig = LfgpConfig()  # the algorithm's own settings
 
-  def __post_init__(self):
-    """Raises ValueError that lists every field out of its range."""
-    faults = [
-      f"config.{name} is {getattr(self, name)!r}; valid: {least} or more"
-      for least, names in _LEAST.items()
-      for name in names.split()
-      if not _is_integer(getattr(self, name)) or getattr(self, name) < least
-    ]
-    if self.algorithm not in algorithms.ALGORITHMS:
-      faults.append(
-        f"config.algorithm is {self.algorithm!r}; valid: "
-        f"{', '.join(algorithms.ALGORITHMS)}"
-      )
-    if self.environment and ":" not in self.environment:
-      faults.append(
-        f"config.environment is {self.environment!r}; valid: nothing (the "
-        "block tasks) or package.module:factory"
-      )
-    if not self.environment and self.main_task not in ALL_TASKS:
-      faults.append(
-        f"config.main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
-      )
-    if self.environment and self.mirror_demonstrations:
-      faults.append(
-        "config.mirror_demonstrations is True; valid: False with "
-        "config.environment (only the block tasks' mirror image is known)"
-      )
-    if self.control_hz not in CONTROL_RATES:
-      faults.append(
-        f"config.control_hz is {self.control_hz!r}; valid: "
-        f"{', '.join(map(str, CONTROL_RATES))}"
-      )
-    steps, most = getattr(self.agent, "episode_steps", 0), 18 * self.control_hz
-    if not self.environment and steps > most:
-      faults.append(
-        f"config.agent.episode_steps is {steps}; valid: at most {most}, 18 s "
-        f"of {self.control_hz} Hz"
-      )
+  @model_validator(mode="after")
+  def _check_fields_together(self):
+    """Raises ValueError that lists every fault."""
+    faults = list(self._faults())
     if faults:
       raise ValueError("\n".join(faults))
+    return self
+
+  def _faults(self):
+    if self.environment and ":" not in self.environment:
+      yield (
+        f"environment is {self.environment!r}; valid: nothing (the block "
+        "tasks) or package.module:factory"
+      )
+    if not self.environment and self.main_task not in ALL_TASKS:
+      yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
+    if self.environment and self.mirror_demonstrations:
+      yield (
+        "mirror_demonstrations is True; valid: False with environment (only "
+        "the block tasks' mirror image is known)"
+      )
+    if self.control_hz not in CONTROL_RATES:
+      rates = ", ".join(map(str, CONTROL_RATES))
+      yield f"control_hz is {self.control_hz!r}; valid: {rates}"
+    if not self.init_from:
+      return
+    valid = f"init_from is {self.init_from!r}; valid: nothing"
+    if not isinstance(self.agent, LfgpConfig):
+      yield f"{valid} with {self.algorithm}"
+    elif self.agent.pretraining.updates:
+      yield f"{valid}, if there are agent.pretraining.updates"
+    elif self.agent.shares_trunk:
+      yield (
+        f"{valid}, unless agent.networks.actor_trunk is own (the critics' "
+        "loss would undo it)"
+      )
 
   @property
   def world(self) -> EnvironmentSpec:
@@ -100,27 +120,20 @@ class RunConfig:
     return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
 
   @property
+  def most_episode_steps(self) -> int:
+    """Steps of an episode, at most."""
+    return self.episode_steps or EPISODE_SECONDS * self.control_hz
+
+  @property
   def uses_demonstrations(self) -> bool:
     """Whether the agent learns from demonstrations at all."""
-    return getattr(self.agent, "uses_demonstrations", True)
+    return self.agent.uses_demonstrations
 
   @property
   def keeps_rewards(self) -> bool:
     """Whether the replay keeps dense rewards, and so the world shows them."""
-    return getattr(self.agent, "keeps_rewards", False)
+    return self.agent.keeps_rewards
 
   def to_dict(self) -> dict[str, Any]:
     """What `config.json` holds; `configs.from_dict` reads it back."""
     return dataclasses.asdict(self)
-
-
-def _is_integer(value: Any) -> bool:
-  return isinstance(value, int) and not isinstance(value, bool)
-
-
-_LEAST = {
-  0: "seed pairs_per_task collect_pairs evaluation_seed evaluation_workers "
-  "threads",
-  1: "env_steps log_every evaluate_every checkpoint_every "
-  "evaluation_episodes replay_capacity",
-}

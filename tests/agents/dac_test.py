@@ -5,33 +5,30 @@ import torch
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.agents.lfgp import LfgpConfig, build
 from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
+from tests.agents import fixtures
 
 TASK = "stack"
 OBS, A, H = 59, 4, 32
 
 
-def _build(tasks=(TASK,), **fields):
-  settings = {
-    "hidden_size": H,
-    "batch_size": 32,
-    "discriminator_batch_size": 32,
-    "layout": "separate",
-    "scheduler": "main_only",
-    "random_steps": 0,
+def _agent(**fields):
+  fields = {
+    "networks.hidden_size": H,
+    "networks.layout": "separate",
+    "scheduler.kind": "main_only",
+    **fields,
   }
-  return build(
-    LfgpConfig(**(settings | fields)),
-    tasks,
-    synthetic.demonstrations(tasks, 200, OBS, A),
-    synthetic.ArrayReplay(synthetic.transitions(500, OBS, A)),
-    0,
-    "cpu",
-    OBS,
-    A,
-  )
+  return fixtures.make_agent((TASK,), observations=OBS, actions=A, **fields)
+
+
+def _heads():
+  generator = torch.Generator().manual_seed(0)
+  return layouts.make_intentions(
+    "separate", Standardiser(OBS), 3, H, A, generator
+  ).heads
 
 
 def _shapes(module):
@@ -40,7 +37,7 @@ def _shapes(module):
 
 class SeparateNetworksTest(parameterized.TestCase):
   def test_have_the_papers_layers(self):
-    networks = _build(hidden_size=256).learner.networks
+    networks = _agent(**{"networks.hidden_size": 256}).learner.networks
     self.assertEqual(
       _shapes(networks.intentions),  # 59-256-256-8
       {
@@ -68,7 +65,7 @@ class SeparateNetworksTest(parameterized.TestCase):
     self.assertEqual(first, (256, 63))
 
   def test_critics_equal_plain_networks(self):
-    heads = _build().learner.networks.critics.heads
+    heads = _agent().learner.networks.critics.heads
     inputs, action = torch.randn(5, OBS), torch.randn(5, A)
     for twin in range(2):
       weight = torch.cat(
@@ -82,7 +79,9 @@ class SeparateNetworksTest(parameterized.TestCase):
 
   @parameterized.parameters("shared", "own")
   def test_each_loss_trains_its_own_network_alone(self, actor_trunk):
-    agent = _build(critic_learning_rate=1e-30, actor_trunk=actor_trunk)
+    agent = _agent(
+      **{"critic.learning_rate": 1e-30, "networks.actor_trunk": actor_trunk}
+    )
     networks = agent.learner.networks
     before = {
       name: [p.detach().clone() for p in module.parameters()]
@@ -97,8 +96,7 @@ class SeparateNetworksTest(parameterized.TestCase):
 
   def test_one_task_alone_moves_nothing_of_another(self):
     """With K tasks no layer is shared: a gradient stays in its own group."""
-    generator = torch.Generator().manual_seed(0)
-    heads = layouts.make_intention_heads("separate", 3, OBS, H, A, generator)
+    heads = _heads()
     mean, _ = heads(torch.randn(4, OBS))
     mean[1].sum().backward()
     for layer in (heads.hidden, heads.second, heads.output):
@@ -106,8 +104,7 @@ class SeparateNetworksTest(parameterized.TestCase):
       self.assertEqual((norms > 0).tolist(), [False, True, False])
 
   def test_one_head_equals_all(self):
-    generator = torch.Generator().manual_seed(0)
-    heads = layouts.make_intention_heads("separate", 3, OBS, H, A, generator)
+    heads = _heads()
     inputs = torch.randn(4, OBS)
     torch.testing.assert_close(heads.one(inputs, 2)[0], heads(inputs)[0][2])
 
@@ -115,7 +112,7 @@ class SeparateNetworksTest(parameterized.TestCase):
 class DacTest(absltest.TestCase):
   def test_discriminator_learns_and_critics_follow(self):
     torch.set_num_threads(1)
-    agent = _build(discriminator_learning_rate=3e-3)
+    agent = _agent(**{"reward.learning_rate": 3e-3})
     agent.update()
     early = agent.metrics()
     for _ in range(150):
@@ -130,7 +127,7 @@ class DacTest(absltest.TestCase):
     self.assertTrue(np.isfinite(late["loss/critic"]))
 
   def test_acts_by_its_one_intention_and_resumes(self):
-    agent, other = _build(), _build()
+    agent, other = _agent(), _agent()
     agent.begin_episode()
     action = agent.act(np.zeros(OBS, np.float32))
     self.assertEqual((action.shape, agent.task), ((A,), TASK))
@@ -138,21 +135,10 @@ class DacTest(absltest.TestCase):
     other.load_state_dict(agent.state_dict())
     agent.update()
     other.update()
-    for name, array in agent.policy_arrays().items():
-      np.testing.assert_array_equal(array, other.policy_arrays()[name])
-
-  def test_warm_start_imitates(self):
-    agent = _build(bc_warm_start_updates=100, bc_learning_rate=3e-3)
-    part = synthetic.demonstrations((TASK,), 200, OBS, A)[TASK]
-    error = lambda: np.square(  # noqa: E731
-      agent.policy.act(part.observation) - part.action
-    ).mean()
-    before = error()
-    agent.prepare()
-    self.assertLess(error(), 0.3 * before)
+    fixtures.assert_same_policy(agent, other)
 
   def test_policy_folder_acts_the_same(self):
-    policy = _build().policy
+    policy = _agent().policy
     folder = self.create_tempdir().full_path
     policy.save(folder)
     loaded = Policy.load(folder)
@@ -161,7 +147,7 @@ class DacTest(absltest.TestCase):
     np.testing.assert_array_equal(loaded.act(rows), policy.act(rows))
 
   def test_policies_stored_without_a_layout_share_a_trunk(self):
-    policy = _build(layout="shared_trunk").policy
+    policy = _agent(**{"networks.layout": "shared_trunk"}).policy
     options = policy.options()
     self.assertEqual(options.pop("layout"), "shared_trunk")
     loaded = Policy.from_arrays(policy.arrays(), options)

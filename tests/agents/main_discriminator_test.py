@@ -4,32 +4,15 @@ import numpy as np
 import torch
 from absl.testing import absltest
 
-from lfgp_dmc.agents import synthetic
-from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from tests.agents import fixtures
+from tests.agents.fixtures import OBS, A
 
 TASKS = ("main", "open_gripper", "reach")
-OBS, A, B = 6, 2, 16
-UNSEEN = "0:2"
+MASKED = {"reward.main_masked": "0:2", "reward.input": "state"}
 
 
-def _build(tasks=TASKS, **fields):
-  settings = {
-    "hidden_size": 16,
-    "batch_size": B,
-    "discriminator_batch_size": 8,
-    "discriminator_input": "state",
-    "main_discriminator_unseen": UNSEEN,
-  }
-  return build(
-    LfgpConfig(**(settings | fields)),
-    tasks,
-    synthetic.demonstrations(tasks, 100, OBS, A),
-    synthetic.ArrayReplay(synthetic.transitions(200, OBS, A)),
-    0,
-    "cpu",
-    OBS,
-    A,
-  )
+def _agent(tasks=TASKS, **fields):
+  return fixtures.make_agent(tasks, **{**MASKED, **fields})
 
 
 class MainDiscriminatorTest(absltest.TestCase):
@@ -37,27 +20,27 @@ class MainDiscriminatorTest(absltest.TestCase):
     super().setUp()
     torch.set_num_threads(1)
 
-  def test_it_alone_does_not_see_what_is_hidden_from_it(self):
-    learner = _build(discriminator_unseen="3:4").learner
+  def test_it_alone_has_its_own_floats_masked(self):
+    learner = _agent(**{"reward.masked": "3:4"}).learner
     action = torch.zeros(OBS + 1, A)
     changed = torch.cat([torch.zeros(1, OBS), torch.eye(OBS)])
-    rewards = learner.rewards(changed, action)
+    rewards = learner.reward.rewards(changed, action)
     differs = (rewards[:, 1:] - rewards[:, :1]).abs() > 1e-6
     main = [False, False, True, True, True, True]
     others = [True, True, True, False, True, True]
     self.assertEqual(differs.tolist(), [main, others, others])
 
-  def test_a_task_alone_has_one_that_does_not_see_it_either(self):
-    agent = _build(TASKS[:1])
+  def test_a_task_alone_has_one_with_them_masked_too(self):
+    agent = _agent(TASKS[:1])
     agent.update()
     self.assertTrue(np.isfinite(agent.metrics()["loss/discriminator"]))
-    rewards = agent.learner.rewards(torch.eye(OBS), torch.zeros(OBS, A))
+    rewards = agent.learner.reward.rewards(torch.eye(OBS), torch.zeros(OBS, A))
     self.assertEqual(rewards.shape, (1, OBS))
     self.assertAlmostEqual(rewards[0, 0].item(), rewards[0, 1].item(), places=6)
     self.assertNotAlmostEqual(rewards[0, 0].item(), rewards[0, 2].item())
 
   def test_each_learns_from_its_own_tasks_pairs(self):
-    agent = _build(discriminator_learning_rate=3e-3)
+    agent = _agent(**{"reward.learning_rate": 3e-3})
     for _ in range(300):
       agent.update()
     agent.metrics()
@@ -69,10 +52,10 @@ class MainDiscriminatorTest(absltest.TestCase):
       self.assertGreater(metrics[f"accuracy_policy/{task}"], 0.7)
 
   def test_metrics_are_means_over_tasks(self):
-    agent = _build()
+    agent = _agent()
     draw = agent.batches.draw(0)
-    parts = agent.learner.discriminators._parts
-    joined = agent.learner.discriminators._joined(
+    parts = agent.learner.reward._parts
+    joined = agent.learner.reward._joined(
       [
         {"loss": torch.tensor(1.0), "reward": torch.tensor([5.0])},
         {"loss": torch.tensor(4.0), "reward": torch.tensor([6.0, 7.0])},
@@ -81,11 +64,11 @@ class MainDiscriminatorTest(absltest.TestCase):
     self.assertLen(parts, 2)
     self.assertEqual(joined["loss"].item(), 3.0)
     self.assertEqual(joined["reward"].tolist(), [5.0, 6.0, 7.0])
-    metrics = agent.learner.update(*draw)
+    metrics = agent.learner.update(draw)
     self.assertEqual(metrics["accuracy_policy"].shape, (3,))
 
   def test_a_checkpoint_brings_both_back(self):
-    agent, other = _build(), _build()
+    agent, other = _agent(), _agent()
     for _ in range(3):
       agent.update()
     other.load_state_dict(agent.state_dict())
@@ -94,13 +77,13 @@ class MainDiscriminatorTest(absltest.TestCase):
       other.update()
     rows = torch.ones(2, OBS), torch.ones(2, A)
     np.testing.assert_array_equal(
-      agent.learner.rewards(*rows), other.learner.rewards(*rows)
+      agent.learner.reward.rewards(*rows), other.learner.reward.rewards(*rows)
     )
 
   def test_transfer_carries_the_other_tasks_over(self):
-    for fields in ({}, {"main_discriminator_unseen": ""}):
-      source = _build(("old", "reach", "open_gripper"), **fields)
-      agent = _build()
+    for fields in ({}, {"reward.main_masked": ""}):
+      source = _agent(("old", "reach", "open_gripper"), **fields)
+      agent = _agent()
       own = agent.learner.networks
       kept = own.main_discriminator.output.weight.clone()
       state = source.learner.state_dict()["networks"]
@@ -114,7 +97,7 @@ class MainDiscriminatorTest(absltest.TestCase):
 
   def test_floats_that_are_not_there_are_refused(self):
     with self.assertRaisesRegex(ValueError, "5:9; the observation has 6"):
-      _build(main_discriminator_unseen="5:9")
+      _agent(**{"reward.main_masked": "5:9"})
 
 
 if __name__ == "__main__":

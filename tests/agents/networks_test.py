@@ -9,7 +9,7 @@ from torch.nn import functional
 
 from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
 from lfgp_dmc.agents.networks.discriminator import Discriminator
-from lfgp_dmc.agents.networks.intentions import IntentionHeads, to_deviation
+from lfgp_dmc.agents.networks.intentions import IntentionHeads, to_std
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
 
@@ -73,17 +73,17 @@ class StackingTest(absltest.TestCase):
   def test_one_intention_equals_its_row_of_all(self):
     heads = IntentionHeads(K, H, H, A, _generator())
     features = torch.randn(B, H, generator=_generator())
-    mean, deviation = heads(features)
+    mean, std = heads(features)
     self.assertEqual(tuple(mean.shape), (K, B, A))
     for task in range(K):
       one_mean, one_raw = heads.one(features, task)
       torch.testing.assert_close(one_mean, mean[task])
-      torch.testing.assert_close(to_deviation(one_raw), deviation[task])
+      torch.testing.assert_close(to_std(one_raw), std[task])
 
-  def test_deviation_is_softplus_plus_epsilon(self):
-    deviation = to_deviation(torch.tensor([0.0, -100.0]))
-    self.assertAlmostEqual(deviation[0].item(), math.log(2), places=6)
-    self.assertAlmostEqual(deviation[1].item(), 1e-7, places=12)
+  def test_std_is_softplus_plus_epsilon(self):
+    std = to_std(torch.tensor([0.0, -100.0]))
+    self.assertAlmostEqual(std[0].item(), math.log(2), places=6)
+    self.assertAlmostEqual(std[1].item(), 1e-7, places=12)
 
   def test_critics_see_their_own_tasks_action(self):
     network = CriticNetwork(
@@ -161,8 +161,8 @@ class DiscriminatorTest(parameterized.TestCase):
     joined = network.join(state, torch.ones(B, A))
     self.assertEqual(tuple(joined.shape), (B, OBS))
 
-  def test_unseen_floats_make_no_difference(self):
-    network = Discriminator(K, OBS, A, H, _generator(), unseen=(0, 2))
+  def test_masked_floats_make_no_difference(self):
+    network = Discriminator(K, OBS, A, H, _generator(), masked=(0, 2))
     state, action = torch.zeros(B, OBS), torch.zeros(B, A)
     joined = network.join(state, action)
     self.assertEqual(tuple(joined.shape), (B, OBS - 2 + A))
@@ -173,20 +173,20 @@ class DiscriminatorTest(parameterized.TestCase):
 
 
 class StandardiserTest(absltest.TestCase):
-  def test_floor_on_the_deviation(self):
+  def test_floor_on_the_std(self):
     standardiser = Standardiser(2)
-    standardiser.fit(np.array([[0.0, 5.0], [4.0, 5.0]], np.float32), 0.5)
-    result = standardiser(torch.tensor([[4.0, 6.0]]))
+    standardiser.fit(np.array([[0.0, 5.0], [4.0, 5.0]], np.float32))
+    result = standardiser(torch.tensor([[4.0, 5.02]]))
     torch.testing.assert_close(result, torch.tensor([[1.0, 2.0]]))
 
-  def test_fine_floats_follow_and_tell_millimetres_apart(self):
-    standardiser = Standardiser(2, absorbing_flag=True, fine_scale=0.01)
+  def test_tanh_features_follow_and_tell_millimetres_apart(self):
+    standardiser = Standardiser(2, tanh_feature_scale=0.01)
     result = standardiser(torch.tensor([[0.002, -1.0]]))
     # tanh(0.2) = 0.197375.
     torch.testing.assert_close(
-      result, torch.tensor([[0.002, -1.0, 0.197375, -1.0, 0.0]])
+      result, torch.tensor([[0.002, -1.0, 0.197375, -1.0]])
     )
-    self.assertEqual(standardiser.input_size, 5)
+    self.assertEqual(standardiser.input_size, 4)
 
   def test_starts_as_the_identity(self):
     row = torch.tensor([[1.5, -2.0]])

@@ -8,11 +8,10 @@ from absl.testing import absltest, parameterized
 from torch.nn import functional
 
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.agents.demonstration_pool import Batch, ExpertPool
-from lfgp_dmc.agents.lfgp.config import LfgpConfig
-from lfgp_dmc.agents.lfgp.learner import LfgpLearner
-from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.batches import Batch, Draw
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.networks.trunk import Standardiser
+from tests.agents import fixtures
 
 TASKS = ("main", "first", "second")
 K, OBS, A, H, B, N = len(TASKS), 59, 4, 32, 24, 16
@@ -21,36 +20,30 @@ GAMMA, LAMBDA = 0.99, 10.0
 
 def _learner(**fields):
   """Steps too small to move a float, so that all losses meet one state."""
-  rates = dict.fromkeys(
-    [
-      "critic_learning_rate",
-      "intention_learning_rate",
-      "temperature_learning_rate",
-      "discriminator_learning_rate",
-    ],
-    1e-30,
+  rates = (
+    "critic.learning_rate",
+    "intention.learning_rate",
+    "intention.temperature_learning_rate",
+    "reward.learning_rate",
   )
-  config = LfgpConfig(
-    hidden_size=H,
-    batch_size=B,
-    discriminator_batch_size=N,
-    max_gradient_norm=1e9,
-    initial_temperature=0.3,
-    **rates,
+  learner = fixtures.make_learner(
+    TASKS,
+    observations=OBS,
+    actions=A,
+    **{
+      "batch_size": B,
+      "intention.initial_temperature": 0.3,
+      "networks.hidden_size": H,
+      "optimiser.max_gradient_norm": 1e9,
+      "reward.batch_size": N,
+    },
+    **dict.fromkeys(rates, 1e-30),
     **fields,
   )
-  networks = make_networks(
-    config,
-    K,
-    A,
-    Standardiser(OBS),
-    torch.Generator().manual_seed(1),
-    torch.device("cpu"),
-  )
   with torch.no_grad():  # keeps the target apart from the online network
-    for parameter in networks.target_critics.parameters():
+    for parameter in learner.networks.target_critics.parameters():
       parameter.mul_(1.3)
-  return LfgpLearner(config, networks, torch.Generator().manual_seed(2))
+  return learner
 
 
 def _layer(inputs, weight, bias):
@@ -102,9 +95,9 @@ class Plain:
       if layer is not None:
         hidden = torch.relu(_layer(hidden, layer.weight[k], layer.bias[k]))
     out = _layer(hidden, heads.output.weight[k], heads.output.bias[k])
-    mean, deviation = out[:, :A], functional.softplus(out[:, A:]) + 1e-7
-    value = mean + deviation * noise
-    density = torch.distributions.Normal(mean, deviation).log_prob(value)
+    mean, std = out[:, :A], functional.softplus(out[:, A:]) + 1e-7
+    value = mean + std * noise
+    density = torch.distributions.Normal(mean, std).log_prob(value)
     correction = 2 * (np.log(2) - value - functional.softplus(-2 * value))
     return torch.tanh(value), (density - correction).sum(1)
 
@@ -158,7 +151,7 @@ class Plain:
 
 
 class PlainUpdateTest(parameterized.TestCase):
-  @parameterized.parameters({}, {"layout": "separate"})
+  @parameterized.parameters({}, {"networks.layout": "separate"})
   def test_losses_and_gradients_equal_the_equations(self, **fields):
     learner = _learner(**fields)
     networks = learner.networks
@@ -189,7 +182,7 @@ class PlainUpdateTest(parameterized.TestCase):
       torch.autograd.grad(loss, parameters, retain_graph=True)
       for loss, parameters in zip(losses, parts.values(), strict=True)
     ]
-    metrics = learner.update(batch, other, expert)
+    metrics = learner.update(Draw(batch, other, expert))
     found = metrics["loss/discriminator"] + metrics["loss/gradient_penalty"]
     torch.testing.assert_close(found, losses[0].detach())
     for name, loss in zip(list(parts)[1:], losses[1:], strict=True):

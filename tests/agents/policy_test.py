@@ -20,7 +20,7 @@ def _policy(seed=0):
   generator = torch.Generator().manual_seed(seed)
   standardiser = Standardiser(OBS)
   rows = np.random.default_rng(seed).standard_normal((50, OBS))
-  standardiser.fit(rows.astype(np.float32), 0.01)
+  standardiser.fit(rows.astype(np.float32))
   network = IntentionNetwork(
     standardiser,
     Trunk(OBS, H, generator),

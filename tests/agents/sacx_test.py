@@ -6,34 +6,36 @@ from absl.testing import absltest
 
 from lfgp_dmc import toy
 from lfgp_dmc.acting import environments, evaluation
-from lfgp_dmc.agents.lfgp import LfgpConfig, build
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics
 from lfgp_dmc.runs.schedule import TrainSchedule
+from tests.agents import fixtures
 
 
 class SacxTest(absltest.TestCase):
   def test_return_rises(self):
     torch.set_num_threads(1)
     environment = toy.PointEnvironment()
-    widths = environments.widths(environment)
-    replay = Replay(2000, *widths, reward_tasks=toy.TASKS)
-    config = LfgpConfig(
-      reward_source="replay",
-      scheduler="q_table",
-      hidden_size=32,
-      batch_size=32,
-      episode_steps=20,
-      xi=10,
-      random_steps=0,
-      warm_up=100,
-      discount=0.9,
-      critic_learning_rate=3e-3,
-      intention_learning_rate=3e-3,
-      initial_temperature=0.05,
-      polyak=0.05,
+    observations, actions = environments.widths(environment)
+    replay = Replay(2000, observations, actions, reward_tasks=toy.TASKS)
+    agent = fixtures.make_agent(
+      toy.TASKS,
+      1,
+      shown={},
+      replay=replay,
+      observations=observations,
+      actions=actions,
+      **{
+        "critic.discount": 0.9,
+        "critic.learning_rate": 3e-3,
+        "critic.polyak": 0.05,
+        "intention.initial_temperature": 0.05,
+        "intention.learning_rate": 3e-3,
+        "networks.hidden_size": 32,
+        "reward.kind": "stored",
+        "scheduler.xi": 10,
+      },
     )
-    agent = build(config, toy.TASKS, {}, replay, 1, "cpu", *widths)
     before = self._returns(agent)
     schedule = TrainSchedule(
       env_steps=500, warmup_steps=100, progress_bar=False

@@ -5,8 +5,8 @@ from absl.testing import absltest, parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.agents import schedulers
-from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.schedulers import q_table
+from tests.agents import fixtures
 
 TASKS = task_names.task_set("stack")
 STACK, LIFT = TASKS.index("stack"), TASKS.index("lift")
@@ -51,10 +51,11 @@ class GuidedExplorationTest(parameterized.TestCase):
 
   def _learn(self, name):
     generator = np.random.default_rng(1)
-    # The scale of temperatures is the returns'.
-    config = LfgpConfig(scheduler=name, scheduler_temperature=20.0)
+    fields = {"scheduler.kind": name}
+    if name == "q_table":  # the scale of temperatures is the returns'
+      fields["scheduler.temperature"] = 20.0
     scheduler = schedulers.make_scheduler(
-      config, TASKS, STACK, STEPS // XI, generator
+      fixtures.config(**fields).scheduler, TASKS, generator
     )
     value = np.zeros((STATES, 2))
     for _ in range(300):

@@ -7,9 +7,11 @@ import torch
 from absl.testing import absltest
 
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.agents.lfgp import LfgpConfig, build
+from lfgp_dmc.agents.lfgp.example_reward import ExampleBounds
 from lfgp_dmc.agents.losses.critic import critic_loss, value_penalty_loss
 from lfgp_dmc.agents.value_bounds import ValueBounds
+from tests.agents import fixtures
+from tests.agents.fixtures import OBS, A
 
 _CPU = torch.device("cpu")
 
@@ -34,12 +36,16 @@ class LossTest(absltest.TestCase):
     self.assertAlmostEqual(loss.item(), 1.0 + 4.0)
 
 
+def _of(bounds, rewards):
+  return bounds(torch.tensor(rewards), torch.zeros(1, 2))
+
+
 class BoundsTest(absltest.TestCase):
   def test_medians_over_a_window(self):
     bounds = ValueBounds(1, 3, 0.9, _CPU)
     seen = []
     for most in (1.0, 2.0, 9.0, 5.0, 7.0):
-      low, high = bounds.of_rewards(torch.tensor([[-2 * most, most]]))
+      low, high = _of(bounds, [[-2 * most, most]])
       seen.append((low.item(), high.item()))
     expected = [1.0, 1.5, 2.0, 5.0, 7.0]
     np.testing.assert_allclose(
@@ -48,16 +54,17 @@ class BoundsTest(absltest.TestCase):
 
   def test_bounds_stay_on_their_sides_of_zero(self):
     bounds = ValueBounds(1, 3, 0.9, _CPU)
-    low, high = bounds.of_rewards(torch.tensor([[2.0, 3.0]]))
+    low, high = _of(bounds, [[2.0, 3.0]])
     self.assertAlmostEqual(low.item(), -0.1, places=4)
     self.assertAlmostEqual(high.item(), 30.0, places=4)
 
   def test_of_examples(self):
-    bounds = ValueBounds(2, 50, 0.99, _CPU)
+    bounds = ExampleBounds(2, 50, 0.99, _CPU)
     own = torch.tensor([[False, True, True], [False, False, False]])
     own[1, 0] = True
     value = torch.tensor([[0.0, 2.0, 4.0], [1.0, 5.0, 5.0]])
-    low, high = bounds.of_examples(value, own, 0.1)
+    reward = 0.1 * (2.0 * own.float() - 1.0)
+    low, high = bounds(reward, value)
     np.testing.assert_allclose(low, [[-10.0], [-10.0]], rtol=1e-4)
     expected = [[3.0, 10.0, 10.0], [10.0, 1.0, 1.0]]
     np.testing.assert_allclose(high, expected, rtol=1e-4)
@@ -67,10 +74,10 @@ class BoundsTest(absltest.TestCase):
     generator = torch.Generator().manual_seed(0)
     rows = torch.randn(12, 2, 5, generator=generator)
     for row in rows[:6]:
-      first.of_rewards(row)
+      first(row, row)
     second.load_state_dict(first.state_dict())
     for row in rows[6:]:
-      torch.testing.assert_close(first.of_rewards(row), second.of_rewards(row))
+      torch.testing.assert_close(first(row, row), second(row, row))
 
 
 class AgentTest(absltest.TestCase):
@@ -78,26 +85,19 @@ class AgentTest(absltest.TestCase):
     """The target's entropy term alone drives values out of the bounds."""
     means = {}
     for penalty in (0.0, 10.0):
-      agent = build(
-        LfgpConfig(
-          hidden_size=16,
-          batch_size=32,
-          reward_source="replay",
-          reward_clip=0.02,
-          scheduler="main_only",
-          critic_learning_rate=3e-3,
-          polyak=0.2,
-          value_penalty=penalty,
-        ),
+      rows = synthetic.transitions(200, OBS, A)
+      agent = fixtures.make_agent(
         ("reach",),
-        {},
-        synthetic.ArrayReplay(
-          synthetic.transitions(200, 6, 2), np.ones((200, 1)), ("reach",)
-        ),
-        0,
-        "cpu",
-        6,
-        2,
+        shown={},
+        replay=synthetic.replay(rows, np.ones((200, 1)), ("reach",)),
+        **{
+          "critic.learning_rate": 3e-3,
+          "critic.polyak": 0.2,
+          "critic.value_penalty": penalty,
+          "reward.clip": 0.02,
+          "reward.kind": "stored",
+          "scheduler.kind": "main_only",
+        },
       )
       for _ in range(200):
         agent.update()

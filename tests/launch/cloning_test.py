@@ -19,7 +19,7 @@ def _config(dataset, algorithm, **changes):
   config = configs.make_config(algorithm)
   small = {
     "agent.batch_size": 8,
-    "agent.hidden_size": 16,
+    "agent.networks.hidden_size": 16,
     "agent.learning_rate": 3e-3,
     "agent.overfit_tolerance": 5,
     "checkpoint_every": 40,
@@ -150,8 +150,6 @@ class DacRunTest(absltest.TestCase):
       dataset,
       **{
         "algorithm": "dac",
-        "agent.layout": "separate",
-        "agent.scheduler": "main_only",
         "env_steps": 60,
       },
     )

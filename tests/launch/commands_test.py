@@ -19,7 +19,7 @@ _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 
 # Script, arguments, what the message says.
 _BAD = (
-  ("train.py --config.agent.sheduler=uniform", "did you mean --config.agent."),
+  ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
   ("train.py --flagfile=no.flags", "no.flags"),
   ("train.py --config.seed=many", "flag --config.seed=many"),
   ("train.py --resume", "--resume needs --run"),
@@ -66,7 +66,7 @@ class DemoTest(absltest.TestCase):
       "--config.collect_pairs=40 --config.env_steps=360 "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
-      "--config.agent.bc_warm_start_updates=5",
+      "--config.agent.pretraining.updates=5",
       str(folder),
     )
     self.assertEqual(done.returncode, 0, done.stderr)
@@ -93,9 +93,9 @@ class BlockRunTest(absltest.TestCase):
       cls.folder / "data", task_names.task_set("bring"), 59, 4
     )
     changes = {
-      "agent.episode_steps": 360,
-      "agent.warm_up": 300,
-      "agent.xi": 45,
+      "episode_steps": 0,
+      "warm_up": 300,
+      "agent.scheduler.xi": 45,
       "env_steps": 400,
       "environment": "",
       "evaluate_every": 400,
@@ -185,13 +185,14 @@ class BlockRunTest(absltest.TestCase):
     self.assertNotIn("GLFW", done.stderr)
 
   def test_benchmarks_print_the_agreed_lines(self):
+    small = "--config.agent.networks.hidden_size=16"
     with futures.ThreadPoolExecutor(command.cores()) as pool:
       lines = (
         "benchmark.py --what=environment --steps=50",
         "benchmark.py --what=stability --steps=50 --tasks=reach",
-        "benchmark.py --what=training --steps=3 --config.agent.hidden_size=16",
-        "benchmark.py --what=learner --seconds=0 --config.agent.hidden_size=16",
-        "benchmark.py --what=memory --steps=3 --config.agent.hidden_size=16 "
+        f"benchmark.py --what=training --steps=3 {small}",
+        f"benchmark.py --what=learner --seconds=0 {small}",
+        f"benchmark.py --what=memory --steps=3 {small} "
         "--config.replay_capacity=2000",
       )
       calls = list(pool.map(self._call, lines))

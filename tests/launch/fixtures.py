@@ -77,28 +77,35 @@ def load_cartpole(seed: int = 0):
 
 def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   """A run of the toy environment that takes a second or two."""
-  config = configs.make_config()
+  kinds = {
+    name: value
+    for name, value in changes.items()
+    if name.endswith(configs.KIND)
+  }
+  config = configs.make_config(changes.get("algorithm", "lfgp"), kinds=kinds)
   small = {
     "agent.batch_size": 8,
-    "agent.discriminator_batch_size": 8,
-    "agent.episode_steps": 20,
-    "agent.hidden_size": 16,
-    "agent.random_steps": 20,
-    "agent.warm_up": 20,
-    "agent.xi": 5,
+    "agent.networks.hidden_size": 16,
+    "agent.reward.batch_size": 8,
+    "agent.scheduler.xi": 5,
     "checkpoint_every": 40,
     "demonstrations": str(dataset),
     "deterministic": True,
     "device": "cpu",
     "env_steps": 200,
+    "episode_steps": 20,
     "environment": POINT,
     "evaluate_every": 100,
     "evaluation_episodes": 2,
     "evaluation_workers": 1,
     "log_every": 20,
     "main_task": "right",
+    "random_steps": 20,
     "replay_capacity": 200,
+    "warm_up": 20,
   }
+  known = dict(configs.flattened(config.to_dict()))
+  small = {name: value for name, value in small.items() if name in known}
   config.update_from_flattened_dict({**small, **changes})
   return configs.to_run_config(config)
 

@@ -15,7 +15,7 @@ class SweepCommandTest(absltest.TestCase):
   def setUp(self):
     super().setUp()
     self.folder = pathlib.Path(self.create_tempdir().full_path)
-    sweep_fixtures.write_flagfiles(self.folder, lfgp_toy=3000)
+    sweep_fixtures.write_flagfiles(self.folder, lfgp=3000)
 
   def _start(self, *arguments) -> subprocess.Popen:
     return sweep_fixtures.start(
@@ -32,13 +32,13 @@ class SweepCommandTest(absltest.TestCase):
     self.assertIn("2 runs: 1 waiting, 1 no flagfile", listed.stdout)
     self.assertFalse((self.folder / "runs").exists())
     running = self._start("--algorithms=lfgp,dac")
-    run = self.folder / "runs" / "lfgp_toy_0"
-    log = run.with_name("lfgp_toy_0.log")
+    run = self.folder / "runs" / "lfgp_right_0"
+    log = run.with_name("lfgp_right_0.log")
     sweep_fixtures.wait_for((run / "metrics.csv").exists)
     running.send_signal(signal.SIGINT)
     _, errors = running.communicate(timeout=60)
     self.assertEqual(running.returncode, command.INTERRUPTED, errors)
-    row = sweep_fixtures.index(self.folder)["lfgp_toy_0"]
+    row = sweep_fixtures.index(self.folder)["lfgp_right_0"]
     self.assertEqual(row["state"], "stopped")
     self.assertGreater(float(row["wall_s"]), 0)
     self.assertNotEmpty(os.listdir(run / "checkpoints"))
@@ -46,7 +46,7 @@ class SweepCommandTest(absltest.TestCase):
     done = self._call()
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 3000", log.read_text())
-    row = sweep_fixtures.index(self.folder)["lfgp_toy_0"]
+    row = sweep_fixtures.index(self.folder)["lfgp_right_0"]
     self.assertEqual((row["state"], row["env_step"]), ("done", "3000"))
     self.assertNotEmpty(row["success"])
     again = self._call()

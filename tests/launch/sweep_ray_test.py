@@ -21,7 +21,7 @@ from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch import command
 from tests.launch import sweep_fixtures
 
-_STEPS = {"lfgp_toy": 1200, "lfgp_transfer_toy": 200}
+_STEPS = {"lfgp_right": 1200, "lfgp_transfer_right": 200}
 _VARIABLES = {
   "RAY_AUTH_MODE": "token",
   "RAY_AUTH_TOKEN": secrets.token_hex(32),
@@ -79,11 +79,11 @@ class SweepRayTest(absltest.TestCase):
     return csv_files.read(self.runs / name / file)[1]
 
   def test_a_killed_node_loses_no_run_and_repeats_none(self):
-    sweep_fixtures.write_flagfiles(self.folder, **_STEPS)
+    sweep_fixtures.write_flagfiles(self.folder, lfgp=1200, lfgp_transfer=200)
     sweep = self._start(
       "--algorithms=lfgp,lfgp_transfer",
       "--seeds=0,1,2",
-      "--start_from=lfgp_transfer_toy:lfgp_toy:config.transfer_from",
+      "--start_from=lfgp_transfer_right:lfgp_right:config.transfer_from",
     )
     second = self.second.node_id
     lost = sweep_fixtures.wait_for(lambda: self._halfway_on(second))
@@ -154,16 +154,16 @@ class SweepRayTest(absltest.TestCase):
     csv_files.write(pathlib.Path(os.environ["TABLE"]), list(rows[0]), rows)
 
   def test_stops_with_a_checkpoint(self):
-    sweep_fixtures.write_flagfiles(self.folder, lfgp_toy=100_000)
+    sweep_fixtures.write_flagfiles(self.folder, lfgp=100_000)
     sweep = self._start("--seeds=0")
-    sweep_fixtures.wait_for((self.runs / "lfgp_toy_0" / "metrics.csv").exists)
+    sweep_fixtures.wait_for((self.runs / "lfgp_right_0" / "metrics.csv").exists)
     sweep.send_signal(signal.SIGINT)
     _, errors = sweep.communicate(timeout=60)
     self.assertEqual(sweep.returncode, command.INTERRUPTED, errors)
-    row = sweep_fixtures.index(self.folder)["lfgp_toy_0"]
+    row = sweep_fixtures.index(self.folder)["lfgp_right_0"]
     self.assertEqual(row["state"], "stopped")
-    log = (self.runs / "lfgp_toy_0.log").read_text()
-    self.assertIn(f"stopped at {self._checkpoint('lfgp_toy_0')} of", log)
+    log = (self.runs / "lfgp_right_0.log").read_text()
+    self.assertIn(f"stopped at {self._checkpoint('lfgp_right_0')} of", log)
 
 
 def _processes(argument: str) -> dict[int, int]:

@@ -39,8 +39,7 @@ class SweepTest(absltest.TestCase):
     self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.flags = self.folder / "flags"
     self.flags.mkdir()
-    for stem in ("lfgp_stack", "lfgp_bring", "lfgp_transfer_stack",
-                 "lfgp_move_object"):  # fmt: skip
+    for stem in ("lfgp", "lfgp_transfer"):
       (self.flags / f"{stem}.flags").touch()
 
   def _jobs(self, algorithms, seeds=(0,), starts=(), arguments=()):
@@ -70,6 +69,7 @@ class SweepTest(absltest.TestCase):
     self.assertEqual(states["lfgp_stack_0"], "waiting")
     self.assertContainsSubset(
       ["--config.seed=7", f"--x={self.folder}/7",
+       f"--flagfile={self.flags}/lfgp.flags", "--config.main_task=stack",
        f"--run={self.folder}/lfgp_stack_7"],
       jobs[names.index("lfgp_stack_7")].train_arguments(),
     )  # fmt: skip

@@ -61,9 +61,9 @@ class TrainingTest(parameterized.TestCase):
 
   def test_another_config_is_not_resumed(self):
     self._train(self._config())
-    changed = self._config(**{"agent.xi": 10, "seed": 4})
+    changed = self._config(**{"agent.scheduler.xi": 10, "seed": 4})
     with self.assertRaisesRegex(
-      UserError, r"seed \(0, now 4\); agent.xi \(5, now 10\)"
+      UserError, r"seed \(0, now 4\); agent.scheduler.xi \(5, now 10\)"
     ):
       self._train(changed, resume=True)
 
@@ -82,7 +82,7 @@ class TrainingTest(parameterized.TestCase):
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
     ({"main_task": "up"}, "up.hdf5: missing"),
     (
-      {"agent.scheduler": "weighted_random_handcrafted"},
+      {"agent.scheduler.kind": "weighted_random_handcrafted"},
       "handcrafted",
     ),
   )
@@ -107,7 +107,6 @@ class TrainingTest(parameterized.TestCase):
       environment="",
       main_task="lift",
       control_hz=5,
-      **{"agent.episode_steps": 90},
     )
     with self.assertRaisesRegex(
       UserError, r"config.control_hz is 5; .* another rate: lift \(20\)"

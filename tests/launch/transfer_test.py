@@ -1,6 +1,5 @@
 """Runs that go on from other runs: SAC-X, transfers, stored policies."""
 
-import dataclasses
 import pathlib
 import shutil
 from unittest import mock
@@ -45,13 +44,8 @@ class _RunTest(parameterized.TestCase):
 
   def _config(self, algorithm="lfgp", **changes):
     if algorithm == "sacx":
-      dense = configs.make_config("sacx").agent.to_dict()
-      small = dataclasses.asdict(fixtures.small_config(self.dataset).agent)
-      for name in ("batch_size", "episode_steps", "hidden_size", "xi"):
-        dense[name] = small[name]
-      dense |= {"warm_up": 20, "scheduler": "uniform"}
-      own = {f"agent.{name}": value for name, value in dense.items()}
-      changes = {**own, "algorithm": "sacx", "demonstrations": "", **changes}
+      own = {"algorithm": "sacx", "demonstrations": "", "random_steps": 0}
+      changes = {**own, "agent.scheduler.kind": "uniform", **changes}
     return fixtures.small_config(
       self.dataset, **{"evaluate_every": 1000, "env_steps": 100, **changes}
     )
@@ -100,7 +94,7 @@ class SacxTest(_RunTest):
 
   def test_a_task_without_a_conditional_table_is_told(self):
     with self.assertRaisesRegex(UserError, "no conditional table for.*'right'"):
-      config = {"agent.scheduler": "conditional_weighted"}
+      config = {"agent.scheduler.kind": "conditional_weighted"}
       self._train(self._config("sacx", **config), "a")
 
   def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
@@ -122,8 +116,8 @@ class TransferTest(_RunTest):
         if algorithm == "sacx"
         else str(self.folder / "other"),
         "transfer_from": str(source),
-        "agent.transfer_updates": 7,
-        "agent.warm_up": 150,
+        "transfer_updates": 7,
+        "warm_up": 150,
         **changes,
       },
     )
@@ -193,7 +187,9 @@ class TransferTest(_RunTest):
 
   def test_what_cannot_be_transferred_from_leaves_no_folder(self):
     lfgp, _ = self._train(self._config(), "lfgp")
-    small, _ = self._train(self._config(**{"agent.hidden_size": 8}), "small")
+    small, _ = self._train(
+      self._config(**{"agent.networks.hidden_size": 8}), "small"
+    )
     bare = self.folder / "bare"
     Policy.load(lfgp).save(bare)
     for config, message in (
@@ -213,13 +209,16 @@ class InitFromTest(_RunTest):
     bare = self.folder / "bare"
     Policy.load(source).save(bare)
     config = self._config(
-      **{"agent.init_from": str(bare), "agent.bc_weight": 1.0}
+      init_from=str(bare), **{"agent.networks.actor_trunk": "own"}
     )
     with mock.patch.object(Run, "train") as train:
       train.return_value = None
       self._train(config, "a")
     self._train(config, "a", resume=True)  # was killed at once: starts again
-    wrong = self._config(**{"agent.init_from": str(self.folder / "data")})
+    wrong = self._config(
+      init_from=str(self.folder / "data"),
+      **{"agent.networks.actor_trunk": "own"},
+    )
     with self.assertRaisesRegex(UserError, "no policy in .*data"):
       self._train(wrong, "b")
 
@@ -228,10 +227,10 @@ class ExamplesTest(_RunTest):
   def test_learns_from_rows_of_success(self):
     config = self._config(
       **{
-        "agent.reward_source": "examples",
-        "agent.scheduler": "weighted_random",
-        "agent.value_penalty": 10.0,
-        "agent.reward_scale": 0.1,
+        "agent.reward.kind": "examples",
+        "agent.scheduler.kind": "weighted_random",
+        "agent.critic.value_penalty": 10.0,
+        "agent.reward.scale": 0.1,
       }
     )
     path, _ = self._train(config, "a")

@@ -1,0 +1,81 @@
+"""Constraints of configs' fields, and groups of fields that agents share.
+
+A config is a frozen dataclass of groups; pydantic checks each field, strictly,
+where it is declared.
+"""
+
+from typing import Annotated, Any, Literal, TypeVar, dataclass_transform
+
+import pydantic.dataclasses
+from pydantic import AfterValidator, ConfigDict, Field
+
+_Config = TypeVar("_Config")
+
+PositiveInt = Annotated[int, Field(strict=True, ge=1)]
+Count = Annotated[int, Field(strict=True, ge=0)]
+Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Real, Field(gt=0)]
+NonNegative = Annotated[Real, Field(ge=0)]
+Share = Annotated[Real, Field(ge=0, le=1)]
+PositiveShare = Annotated[Real, Field(gt=0, le=1)]
+ProperShare = Annotated[Real, Field(gt=0, lt=1)]
+Switch = Annotated[bool, Field(strict=True)]
+Text = Annotated[str, Field(strict=True)]
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True)
+def checked(kind: type[_Config]) -> type[_Config]:
+  """Makes a class a frozen, checked dataclass that refuses unknown fields."""
+  made: Any = pydantic.dataclasses.dataclass(
+    kind, frozen=True, kw_only=True, config=ConfigDict(extra="forbid")
+  )
+  return made
+
+
+def positions(slices: str) -> tuple[int, ...]:
+  """The indices that slices such as "3:6,53:59" name.
+
+  Raises:
+    ValueError: not START:STOP, with commas between.
+  """
+  found: list[int] = []
+  for part in filter(None, slices.split(",")):
+    start, _, stop = part.partition(":")
+    if not (start.isdecimal() and stop.isdecimal() and int(start) < int(stop)):
+      raise ValueError("slices of an observation, such as 3:6,53:59")
+    found += range(int(start), int(stop))
+  return tuple(found)
+
+
+def _checked_slices(slices: str) -> str:
+  positions(slices)
+  return slices
+
+
+Slices = Annotated[Text, AfterValidator(_checked_slices)]
+
+
+@checked
+class InputsConfig:
+  """What networks see of an observation."""
+
+  standardise: Switch = False  # by the demonstrations' mean and std
+  tanh_feature_scale: NonNegative = (
+    0.0  # c of tanh(x / c) beside x (m); 0: none
+  )
+
+
+@checked
+class NetworksConfig:
+  """Sizes; see `networks/layouts.py`."""
+
+  hidden_size: PositiveInt = 256
+  layout: Literal["shared_trunk", "separate"] = "shared_trunk"
+
+
+@checked
+class OptimiserConfig:
+  """What gradient steps have in common."""
+
+  weight_decay: NonNegative = 0.0  # above 0: AdamW
+  max_gradient_norm: NonNegative = 10.0  # 0: none

@@ -1,0 +1,112 @@
+"""Samples the batches of one update."""
+
+import numpy as np
+import torch
+
+from lfgp_dmc.agents.batches import Batch, Draw, joined
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp.config import (
+  DiscriminatorReward,
+  ExampleReward,
+  RewardConfig,
+)
+from lfgp_dmc.agents.lfgp.device_replay import DeviceReplay
+from lfgp_dmc.agents.lfgp.example_reward import example_rows, with_examples
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.data.replay import Replay
+
+
+class BatchMaker:
+  """Draws batches from the replay and from the experts."""
+
+  def __init__(
+    self,
+    config: RewardConfig,
+    rows: int,
+    replay: Replay,
+    reward_columns: list[int],
+    experts: ExpertPool | None,
+    standardiser: Standardiser,
+    generator: np.random.Generator,
+  ):
+    """Keeps the sources.
+
+    Args:
+      config: which rows each reward needs.
+      rows: B.
+      replay: transitions.
+      reward_columns: of its rewards, those of the K tasks; none are used.
+      experts: demonstrations; None: this config uses none.
+      standardiser: raw observations -> network inputs, on the device.
+      generator: source of every index.
+
+    Raises:
+      ValueError: a task has no row of success where such rows are needed.
+    """
+    self._config = config
+    self._rows = rows
+    self._replay = replay
+    self._columns = reward_columns
+    self._experts = experts
+    self._standardiser = standardiser
+    self.generator = generator
+    self._device = standardiser.mean.device
+    self._mirror = None
+    if self._device.type != "cpu":
+      self._mirror = DeviceReplay(replay, self._device)
+    if isinstance(config, ExampleReward) or (
+      isinstance(config, DiscriminatorReward) and config.final_share > 0
+    ):
+      self._pool.check_finals()
+
+  def draw(self, updates: int) -> Draw:
+    """Draws for one update, after so many of them."""
+    match self._config:
+      case DiscriminatorReward() as config:
+        return self._with_experts(config, updates)
+      case ExampleReward() as config:
+        rows = example_rows(config, self._rows)
+        batch = self._transitions(self._rows - rows)
+        return Draw(
+          with_examples(batch, self._pool, self.generator, rows, config.noise)
+        )
+    return Draw(self._transitions(self._rows))
+
+  def _with_experts(self, config: DiscriminatorReward, updates: int) -> Draw:
+    policy = expert = None
+    if updates % config.every == 0:
+      policy = self._transitions(self._rows)
+      finals = int(config.final_share * config.batch_size)
+      expert = self._pool.sample(self.generator, config.batch_size, finals)
+    share = config.expert_share * config.expert_share_decay**updates
+    rows = int(share * self._rows)
+    batch = self._transitions(self._rows - rows)
+    if rows:
+      shown = self._pool.sample_transitions(self.generator, rows)
+      batch = joined(batch, shown)
+    return Draw(batch, policy, expert)
+
+  def _transitions(self, rows: int) -> Batch:
+    """Transitions of the replay, with their rewards if those are used."""
+    indices = self._replay.sample_indices(self.generator, rows)
+    if self._mirror is not None:
+      observation, action, following = self._mirror.gather(indices)
+    else:
+      observation, action, following = map(
+        torch.from_numpy, self._replay.gather(indices)
+      )
+    reward = None
+    if self._columns:
+      stored = self._replay.gather_rewards(indices)[:, self._columns]
+      reward = torch.from_numpy(stored.T.copy()).to(self._device)
+    return Batch(
+      self._standardiser(observation),
+      action,
+      self._standardiser(following),
+      reward,
+    )
+
+  @property
+  def _pool(self) -> ExpertPool:
+    assert self._experts is not None, "this config uses demonstrations"
+    return self._experts

@@ -1,0 +1,48 @@
+"""Where rewards come from: the interface of each source."""
+
+from typing import NamedTuple
+
+import numpy as np
+import torch
+
+from lfgp_dmc.agents.batches import Batch, Draw
+from lfgp_dmc.agents.value_bounds import ValueBounds
+from lfgp_dmc.types import Episode
+
+Metrics = dict[str, torch.Tensor]
+
+
+class LabelledBatch(NamedTuple):
+  """What critics and intentions learn from."""
+
+  inputs: torch.Tensor  # [B, O], standardised
+  action: torch.Tensor  # [B, A]
+  next_inputs: torch.Tensor  # [B, O], standardised
+  reward: torch.Tensor  # [K, B]
+  # [K, B], 1 where a task's critics learn from a row, else 0; None: all 1.
+  mask: torch.Tensor | None = None
+  policy_rows: int | None = None  # intentions learn from the first; None: all
+
+
+class RewardSource:
+  """By default one that learns nothing; each source is a file of its own."""
+
+  # The kind of bounds on values that follows from its rewards.
+  bounds: type[ValueBounds] = ValueBounds
+
+  def __init__(self):
+    """Starts without optimisers, by the names used in checkpoints."""
+    self.optimisers: dict[str, torch.optim.Optimizer] = {}
+
+  def update(self, draw: Draw) -> Metrics:
+    """Makes an update of what gives the reward; its metrics."""
+    del draw
+    return {}
+
+  def label(self, batch: Batch) -> LabelledBatch:
+    """Gives each row its reward for each task."""
+    raise NotImplementedError
+
+  def main_rewards(self, episode: Episode) -> np.ndarray:
+    """The main task's reward of each step of an episode, float [T]."""
+    raise NotImplementedError

@@ -1,0 +1,58 @@
+"""The copy of the replay on the device always holds what the replay holds."""
+
+import numpy as np
+import torch
+from absl.testing import absltest
+
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp.device_replay import DeviceReplay
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.types import Transition
+
+OBS, A = 3, 2
+
+
+class DeviceReplayTest(absltest.TestCase):
+  def setUp(self):
+    super().setUp()
+    self.replay = Replay(50, OBS, A, slack=10)
+    self.rows = DeviceReplay(self.replay, torch.device("cpu"))
+    self.seed = 0
+
+  def _add(self, count):
+    self.seed += 1
+    made = synthetic.transitions(count, OBS, A, self.seed)
+    self.replay.add_batch(Transition(*made))
+
+  def _check(self):
+    indices = np.arange(len(self.replay))[::-1].copy()
+    for one, other in zip(
+      self.rows.gather(indices), self.replay.gather(indices), strict=True
+    ):
+      np.testing.assert_array_equal(one.numpy(), other)
+
+  def test_follows_additions_also_around_the_ring(self):
+    for count in (1, 20, 29, 7, 50, 200, 3):
+      self._add(count)
+      self._check()
+
+  def test_follows_withdrawals_that_were_replaced(self):
+    self._add(30)
+    self._check()
+    self.replay.withdraw(10)
+    self._add(25)  # more rows than before, and other ones from the 20th on
+    self._check()
+    self._add(30)
+    self._check()
+    self.replay.rewind(self.replay.total - 5)
+    self._add(5)
+    self._check()
+
+  def test_starts_from_a_replay_that_is_full(self):
+    self._add(70)
+    self.rows = DeviceReplay(self.replay, torch.device("cpu"))
+    self._check()
+
+
+if __name__ == "__main__":
+  absltest.main()

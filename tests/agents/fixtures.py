@@ -1,0 +1,159 @@
+"""Small configs, agents and learners on made-up data.
+
+Settings go by dotted names: `make_agent(**{"scheduler.xi": 5})`.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+
+from lfgp_dmc.agents import bc, lfgp, synthetic
+from lfgp_dmc.agents.batches import Batch
+from lfgp_dmc.agents.bc import BcConfig
+from lfgp_dmc.agents.demonstration_pool import ExpertPool
+from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.lfgp.builder import make_learner as build_learner
+from lfgp_dmc.agents.lfgp.networks import make_networks
+from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.runs import pytree
+
+TASKS = ("stack", "reach", "lift")
+OBS, A, B = 6, 2, 32
+
+
+def nested(fields: Mapping[str, Any]) -> dict[str, Any]:
+  """{"a.b": 1} -> {"a": {"b": 1}}."""
+  tree: dict[str, Any] = {}
+  for name, value in fields.items():
+    group, _, field = name.rpartition(".")
+    (tree.setdefault(group, {}) if group else tree)[field] = value
+  return tree
+
+
+def config(**fields: Any) -> LfgpConfig:
+  """A small LfGP."""
+  small = {"batch_size": B, "networks.hidden_size": 16}
+  fields.setdefault("reward.kind", "discriminator")
+  fields.setdefault("scheduler.kind", "q_table")
+  if fields["reward.kind"] == "discriminator":
+    small["reward.batch_size"] = B
+  return LfgpConfig(**nested({**small, **fields}))
+
+
+def demonstrations(
+  tasks: Sequence[str] = TASKS, pairs: int = 100, attempt: int = 20, **sizes
+):
+  """Of each task, by `synthetic.demonstrations`."""
+  shape = (sizes.get("observations", OBS), sizes.get("actions", A))
+  seed = sizes.get("seed", 0)
+  return synthetic.demonstrations(tasks, pairs, *shape, seed, attempt)
+
+
+def make_agent(
+  tasks: Sequence[str] = TASKS,
+  seed: int = 0,
+  *,
+  shown=None,
+  replay=None,
+  observations: int = OBS,
+  actions: int = A,
+  bfloat16: bool = False,
+  **fields: Any,
+):
+  """A small LfGP agent on made-up data; `fields`: of `config`."""
+  if shown is None:
+    sizes = {"observations": observations, "actions": actions}
+    shown = demonstrations(tasks, **sizes)
+  if replay is None:
+    rows = synthetic.transitions(200, observations, actions)
+    replay = synthetic.replay(rows)
+  return lfgp.build(
+    config(**fields),
+    tasks,
+    shown,
+    replay,
+    seed,
+    "cpu",
+    observations,
+    actions,
+    bfloat16=bfloat16,
+  )
+
+
+def make_learner(
+  tasks: Sequence[str] = TASKS,
+  *,
+  observations: int = OBS,
+  actions: int = A,
+  dtype: torch.dtype = torch.float32,
+  recorder=None,
+  **fields: Any,
+):
+  """Networks and their learner without data; `fields`: of `config`."""
+  settings = config(**fields)
+  networks = make_networks(
+    settings,
+    len(tasks),
+    actions,
+    Standardiser(observations),
+    torch.Generator().manual_seed(1),
+    torch.device("cpu"),
+  )
+  noise = torch.Generator().manual_seed(2)
+  return build_learner(settings, networks, noise, dtype, recorder)
+
+
+def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
+  """A small BC agent on made-up data."""
+  small = {
+    "batch_size": 16,
+    "learning_rate": 3e-3,
+    "networks.hidden_size": 32,
+    "networks.layout": "separate" if len(tasks) == 1 else "shared_trunk",
+  }
+  bfloat16 = fields.pop("bfloat16", False)
+  settings = BcConfig(**nested({**small, **fields}))
+  shown = demonstrations(tasks)
+  return bc.build(
+    settings, tasks, shown, None, seed, "cpu", OBS, A, bfloat16=bfloat16
+  )
+
+
+def pool(**sizes) -> ExpertPool:
+  """The experts of `TASKS`."""
+  return ExpertPool(demonstrations(**sizes), TASKS, Standardiser(OBS))
+
+
+def batch(rows: int = B, seed: int = 0) -> Batch:
+  """Transitions."""
+  return Batch(
+    *map(torch.from_numpy, synthetic.transitions(rows, OBS, A, seed))
+  )
+
+
+def states(module: torch.nn.Module) -> dict[str, torch.Tensor]:
+  """A copy of all parameters and buffers."""
+  return {name: value.clone() for name, value in module.state_dict().items()}
+
+
+def moved(before: Mapping[str, torch.Tensor], module: torch.nn.Module) -> set:
+  """The names of what has changed since."""
+  now = module.state_dict()
+  return {
+    name for name, old in before.items() if not torch.equal(old, now[name])
+  }
+
+
+def reloaded(state: Mapping[str, Any]) -> dict[str, Any]:
+  """A state as a checkpoint gives it back."""
+  arrays, tree = pytree.pack(state)
+  return pytree.unpack(arrays, json.loads(json.dumps(tree)))
+
+
+def assert_same_policy(one, other) -> None:
+  """Both agents act alike, to the bit."""
+  for name, array in one.policy_arrays().items():
+    np.testing.assert_array_equal(array, other.policy_arrays()[name])

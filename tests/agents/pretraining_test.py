@@ -1,0 +1,243 @@
+"""Pretraining by cloning, and whether it is kept."""
+
+from unittest import mock
+
+import numpy as np
+import torch
+from absl import logging
+from absl.testing import absltest, parameterized
+
+from lfgp_dmc import toy
+from lfgp_dmc.acting import collection, environments, evaluation
+from lfgp_dmc.acting.attempts import Plan
+from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp.prior import entropies
+from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.runs import loop, metrics
+from tests.agents import fixtures
+from tests.agents.fixtures import OBS, TASKS, A, make_agent, states
+
+_OWN = {"networks.actor_trunk": "own"}
+
+
+class PretrainingTest(parameterized.TestCase):
+  @parameterized.parameters("shared_trunk", "separate")
+  def test_imitates_without_an_update(self, layout):
+    agent = make_agent(
+      **{
+        **_OWN,
+        "networks.layout": layout,
+        "pretraining.learning_rate": 3e-3,
+        "pretraining.updates": 300,
+      }
+    )
+    part = fixtures.demonstrations()["reach"]
+
+    def error():
+      acts = agent.policy.act(part.observation, "reach")
+      return np.square(acts - part.action).mean()
+
+    before = error()
+    agent.prepare()
+    self.assertLess(error(), 0.2 * before)
+    self.assertEqual(agent.updates, 0)
+
+  def test_intentions_and_temperatures_wait_for_the_critics(self):
+    agent = make_agent(
+      **{"critic.warmup_updates": 2, "intention.learning_rate": 1e-3}
+    )
+    networks = agent.learner.networks
+    heads = states(networks.intentions.heads)
+    critics = states(networks.critics)
+    for _ in range(2):
+      agent.update()
+    self.assertEmpty(fixtures.moved(heads, networks.intentions.heads))
+    self.assertEqual(networks.log_temperature.tolist(), [0.0] * len(TASKS))
+    self.assertIn("heads.bias", fixtures.moved(critics, networks.critics))
+    agent.update()
+    moved = fixtures.moved(heads, networks.intentions.heads)
+    self.assertIn("output.bias", moved)
+    self.assertNotEqual(networks.log_temperature[0].item(), 0.0)
+
+  def test_cloned_intentions_get_the_std_of_the_config(self):
+    agent = make_agent(
+      **{**_OWN, "pretraining.updates": 1, "pretraining.std": 0.1}
+    )
+    agent.prepare()
+    _, std = agent.learner.networks.intentions(torch.randn(7, OBS))
+    torch.testing.assert_close(std, torch.full_like(std, 0.1))
+
+  def test_likelihood_learns_how_precise_the_expert_is(self):
+    shown = fixtures.demonstrations()
+    random = np.random.default_rng(0)
+    for data in shown.values():  # the second action precise, the first not
+      data.action[:, 0] = random.normal(0.0, 0.3, len(data.action))
+      data.action[:, 1] = random.normal(0.2, 0.03, len(data.action))
+    agent = make_agent(
+      shown=shown,
+      **{
+        **_OWN,
+        "batch_size": 64,
+        "pretraining.learning_rate": 3e-3,
+        "pretraining.loss": "likelihood",
+        "pretraining.updates": 1000,
+      },
+    )
+    agent.prepare()
+    rows = torch.from_numpy(shown["stack"].observation)
+    _, std = agent.learner.networks.intentions(rows)
+    coarse, fine = std.mean((0, 1)).tolist()
+    self.assertBetween(coarse, 0.2, 0.6)
+    self.assertBetween(fine, 0.01, 0.1)
+
+
+class PriorTest(parameterized.TestCase):
+  @parameterized.parameters("squared_error", "divergence")
+  def test_keeps_intentions_near_their_start_on_replayed_rows(self, distance):
+    distances = []
+    for weight in (1e-6, 100.0):
+      agent = make_agent(
+        **{
+          **_OWN,
+          "intention.learning_rate": 1e-2,
+          "prior.distance": distance,
+          "prior.weight": weight,
+        }
+      )
+      agent.prepare()
+      rows = torch.from_numpy(synthetic.transitions(50, OBS, A).observation)
+      start = agent.learner.networks.intentions(rows)[0].tanh()
+      for _ in range(50):
+        agent.update()
+      now = agent.learner.networks.intentions(rows)[0].tanh()
+      distances.append((now - start).square().sum(-1).mean().item())
+      state = agent.state_dict()["learner"]["networks"]["prior"]
+      self.assertIn("trunk.first.weight", state)  # a resume needs it
+    self.assertLess(distances[1], 0.2 * distances[0])
+
+  def test_the_weight_decays_and_counts_in_values(self):
+    agent = make_agent(
+      **{"prior.weight": 2.0, "prior.decay": 0.5, "prior.normalise": True}
+    )
+    prior = agent.learner.prior
+    inputs = torch.zeros(4, OBS)
+    mean, std = torch.ones(2, len(TASKS), 4, A)
+    q = torch.full((2, len(TASKS), 4), -3.0)
+    losses = []
+    for updates in (0, 1, 2):
+      prior.fade(updates)
+      loss, found = prior(inputs, mean, std, q)
+      losses.append(loss.item())
+    by_hand = 2.0 * 3.0 * found["distance_from_prior"].sum().item()
+    np.testing.assert_allclose(
+      losses, [by_hand, by_hand / 2, by_hand / 4], rtol=1e-5
+    )
+
+  def test_too_high_a_target_entropy_is_reported_by_task(self):
+    fields = {"prior.distance": "divergence", "prior.weight": 0.1}
+    for std, tasks in ((0.01, list(TASKS)), (1.0, [])):
+      agent = make_agent(**fields, **{"intention.target_entropy": -2.0})
+      agent.learner.networks.intentions.heads.set_std(std)
+      with mock.patch.object(logging, "warning") as warning:
+        agent.prepare()
+      self.assertEqual([call.args[1] for call in warning.mock_calls], tasks)
+
+  def test_works_without_demonstrations(self):
+    rows = synthetic.transitions(50, OBS, A)
+    rewards = np.zeros((50, len(TASKS)), np.float32)
+    agent = make_agent(
+      shown={},
+      replay=synthetic.replay(rows, rewards, TASKS),
+      **{
+        "prior.distance": "divergence",
+        "prior.weight": 0.1,
+        "reward.kind": "stored",
+      },
+    )
+    agent.prepare()
+    agent.update()
+    self.assertIn("distance_from_prior/stack", agent.metrics())
+
+  def test_entropy_by_hand(self):
+    network = make_agent().learner.networks.intentions
+    network.heads.set_std(0.01)
+    with torch.no_grad():
+      network.heads.output.weight[..., :A] = 0.0
+      network.heads.output.bias[..., :A] = 0.0
+    found = entropies(
+      network, torch.zeros(len(TASKS), 20_000, OBS), torch.Generator()
+    )
+    # A Gaussian's, 0.5 ln(2 pi e) + ln 0.01 a float; the tanh is straight here.
+    by_hand = A * (1.418939 - 4.605170)
+    np.testing.assert_allclose(found, by_hand, atol=0.02)
+
+
+class KeptSuccessTest(absltest.TestCase):
+  """A thousand updates after pretraining: success is not lost."""
+
+  def test_success_of_cloning_is_kept(self):
+    torch.set_num_threads(1)
+    plan = Plan(
+      lambda task: toy.PointEnvironment(),
+      toy.WalkingActor,
+      "right",
+      toy.TASKS,
+      seed=1,
+    )
+    shown = collection.collect(plan, "reset", toy.TASKS, 200, progress=False)
+    shown = {task: part.demonstrations for task, part in shown.items()}
+    environment = toy.PointEnvironment()
+    observations, actions = environments.widths(environment)
+    replay = Replay(1200, observations, actions)
+    agent = make_agent(
+      toy.TASKS,
+      shown=shown,
+      replay=replay,
+      observations=observations,
+      actions=actions,
+      **{
+        **_OWN,
+        "intention.initial_temperature": 0.01,
+        "intention.learning_rate": 3e-4,
+        "networks.hidden_size": 32,
+        "pretraining.learning_rate": 3e-3,
+        "pretraining.updates": 200,
+        "prior.weight": 10.0,
+        "scheduler.xi": 5,
+      },
+    )
+    agent.prepare()
+    before, apart = self._success(agent), _distance(agent, shown)
+    self.assertEqual(before, {"right": 1.0, "left": 1.0})
+    log = metrics.MetricsLog(self.create_tempdir().full_path)
+    schedule = loop.TrainSchedule(
+      env_steps=1100, warmup_steps=100, progress_bar=False
+    )
+    loop.train(environment, agent, replay, schedule, log)
+    self.assertEqual(agent.updates, 1001)
+    self.assertEqual(self._success(agent), before)
+    self.assertLess(_distance(agent, shown), 1.2 * apart)
+
+  def _success(self, agent):
+    rows = evaluation.evaluate(
+      toy.PointEnvironment,
+      lambda: agent.policy,
+      toy.TASKS,
+      episodes=10,
+      seed=0,
+      progress=False,
+    )
+    return evaluation.success_rates(rows)
+
+
+def _distance(agent, shown):
+  """The mean distance of actions from the demonstrated ones."""
+  squares = [
+    np.square(agent.policy.act(data.observation, task) - data.action).sum(1)
+    for task, data in shown.items()
+  ]
+  return float(np.sqrt(np.mean(squares)))
+
+
+if __name__ == "__main__":
+  absltest.main()

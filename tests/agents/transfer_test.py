@@ -1,0 +1,149 @@
+"""What a new agent takes over from another: exactly what it says."""
+
+import numpy as np
+from absl.testing import absltest, parameterized
+
+from lfgp_dmc.agents import synthetic
+from tests.agents import fixtures
+from tests.agents.fixtures import OBS, A
+
+OLD = ("move_object", "open_gripper", "reach")
+NEW = ("stack", "reach", "move_object", "lift")
+_OWN = {"networks.actor_trunk": "own"}
+
+
+def _agent(tasks, seed=2, **fields):
+  rows = synthetic.transitions(100, OBS, A)
+  replay = synthetic.replay(rows, np.zeros((100, 4), np.float32), NEW)
+  return fixtures.make_agent(tasks, seed, replay=replay, **fields)
+
+
+def _networks(agent):
+  return agent.state_dict()["learner"]["networks"]
+
+
+def _trained(tasks=OLD, **fields):
+  agent = _agent(tasks, 1, **fields)
+  for _ in range(5):
+    agent.update()
+  return agent
+
+
+class CarryOverTest(parameterized.TestCase):
+  @parameterized.parameters(
+    {},
+    {**_OWN, "networks.critic_layer_norm": True, "inputs.standardise": True},
+    {"networks.layout": "separate"},
+  )
+  def test_carries_what_it_says_and_nothing_else(self, **fields):
+    source, agent = _trained(**fields), _agent(NEW, **fields)
+    old, fresh = _networks(source), _networks(agent)
+    agent.carry_over(old, OLD)
+    new = _networks(agent)
+    for network in ("intentions", "critics"):
+      for name, array in new[network].items():
+        if not name.startswith("heads."):
+          np.testing.assert_array_equal(array, old[network][name])
+          continue
+        twins = len(array) // len(NEW)
+        shape = array.shape[1:]
+        found = array.reshape(twins, len(NEW), *shape)
+        carried = old[network][name].reshape(twins, len(OLD), *shape)
+        random = fresh[network][name].reshape(twins, len(NEW), *shape)
+        for index, task in enumerate(NEW):
+          expected = random[:, index]
+          if task in OLD:
+            expected = carried[:, OLD.index(task)]
+          np.testing.assert_array_equal(found[:, index], expected)
+    np.testing.assert_equal(new["target_critics"], new["critics"])
+    self._check_discriminator(old, fresh, new)
+
+  def _check_discriminator(self, old, fresh, new):
+    old, fresh, new = (part["discriminator"] for part in (old, fresh, new))
+    for name, array in new.items():
+      if not name.startswith("output."):
+        np.testing.assert_array_equal(array, old[name])
+    np.testing.assert_array_equal(new["output.bias"], fresh["output.bias"])
+    for index, task in enumerate(NEW):
+      expected = fresh["output.weight"][index]
+      if task in OLD:
+        expected = old["output.weight"][OLD.index(task)]
+      np.testing.assert_array_equal(new["output.weight"][index], expected)
+
+  def test_temperatures_optimisers_and_scheduler_stay_fresh(self):
+    agent, untouched = _agent(NEW), _agent(NEW)
+    agent.carry_over(_networks(_trained()), OLD)
+    state, expected = agent.state_dict(), untouched.state_dict()
+    for name in ("log_temperature", "optimisers", "updates"):
+      np.testing.assert_equal(state["learner"][name], expected["learner"][name])
+    np.testing.assert_equal(state["scheduler"], expected["scheduler"])
+
+  @parameterized.parameters((NEW, 3), (OLD, 0))
+  def test_a_new_task_makes_updates_before_the_first_step(self, tasks, updates):
+    agent = _agent(tasks)
+    agent.carry_over(_networks(_trained()), OLD, 3)
+    agent.prepare()
+    agent.prepare()
+    self.assertEqual(agent.updates, updates)
+
+  def test_standardisation_comes_along_for_the_demonstrations_too(self):
+    source = _trained(**{"inputs.standardise": True})
+    agent = _agent(NEW, **{"inputs.standardise": True})
+    agent.carry_over(_networks(source), OLD)
+    mean = _networks(source)["intentions"]["standardiser.mean"]
+    std = _networks(source)["intentions"]["standardiser.deviation"]
+    pool = agent._experts
+    expected = (pool._observation.numpy() - mean) / std
+    np.testing.assert_allclose(pool._inputs, expected, rtol=1e-5, atol=1e-5)
+
+  def test_without_discriminator_on_either_side(self):
+    stored = {"reward.kind": "stored"}
+    source = _trained(NEW, **stored)
+    agent = _agent(NEW)
+    fresh = _networks(agent)["discriminator"]
+    agent.carry_over(_networks(source), NEW)
+    np.testing.assert_equal(_networks(agent)["discriminator"], fresh)
+    _agent(NEW, 3, **stored).carry_over(_networks(_trained()), OLD)
+
+  @parameterized.parameters(
+    ({"networks.hidden_size": 8}, r"intentions: .*has shape \[8"),
+    ({"networks.layout": "separate"}, "intentions: trunk.*missing"),
+    ({"reward.input": "state"}, r"discriminator: first.weight has shape"),
+  )
+  def test_other_sizes_are_refused(self, fields, message):
+    with self.assertRaisesRegex(ValueError, message):
+      _agent(NEW).carry_over(_networks(_trained(**fields)), OLD)
+
+  def test_nothing_in_common_is_refused(self):
+    with self.assertRaisesRegex(ValueError, "none of stack.*it has: bring"):
+      _agent(NEW).carry_over({}, ("bring",))
+
+
+class InitFromTest(parameterized.TestCase):
+  @parameterized.parameters("shared_trunk", "separate")
+  def test_intentions_of_common_tasks_act_like_the_policy(self, layout):
+    fields = {**_OWN, "inputs.standardise": True, "networks.layout": layout}
+    policy = _agent(("reach", "bring"), 1, **fields).policy
+    agent = _agent(NEW, **fields)
+    rows = synthetic.transitions(5, OBS, A).observation
+    before = agent.policy.act(rows, "stack")
+    agent.start_from(policy)
+    np.testing.assert_array_equal(
+      agent.policy.act(rows, "reach"), policy.act(rows, "reach")
+    )
+    self.assertFalse(np.array_equal(agent.policy.act(rows, "stack"), before))
+    networks = agent.learner.networks
+    self.assertIsNot(networks.intentions.trunk, networks.critics.trunk)
+    agent.prepare()
+    agent.update()
+
+  def test_other_sizes_and_tasks_are_refused(self):
+    agent = _agent(NEW, **_OWN)
+    with self.assertRaisesRegex(ValueError, "the policy has none of stack"):
+      agent.start_from(_agent(("bring",)).policy)
+    with self.assertRaisesRegex(ValueError, "the policy: .*has shape"):
+      agent.start_from(_agent(NEW, **{"networks.hidden_size": 8}).policy)
+
+
+if __name__ == "__main__":
+  absltest.main()
