@@ -2,8 +2,11 @@
 
 import contextlib
 import dataclasses
+import os
 import pathlib
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from unittest import mock
 
@@ -17,6 +20,21 @@ from lfgp_dmc.runs import run
 from tests import fixtures
 
 POINT = "lfgp_dmc.toy:PointEnvironment"
+_LAUNCH = pathlib.Path(configs.__file__).resolve().parents[1]
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
+
+
+def call(line: str, folder: os.PathLike | str) -> subprocess.CompletedProcess:
+  """Runs a command, such as `plot.py --runs=a`, without a display."""
+  script, *arguments = line.split()
+  return subprocess.run(
+    [sys.executable, _LAUNCH / script, *arguments],
+    cwd=folder,
+    env={k: v for k, v in os.environ.items() if k not in _DISPLAYS},
+    capture_output=True,
+    text=True,
+    check=False,
+  )
 
 
 def write_dataset(
