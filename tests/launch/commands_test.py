@@ -199,12 +199,7 @@ class BlockRunTest(absltest.TestCase):
     names = [_names(done) for done in calls]
     self.assertEqual(
       names[0],
-      [
-        "control_steps_per_s",
-        "mj_step_per_s",
-        "mj_step_fraction",
-        "reset_ms",
-      ],
+      ["control_steps_per_s", "mj_step_per_s", "mj_step_fraction", "reset_ms"],
     )
     self.assertContainsSubset(
       ["steps", "nan", "warnings", "blocks_out", "max_block_speed"], names[1]

@@ -1,6 +1,5 @@
 """Runs that go on from other runs: SAC-X, transfers, stored policies."""
 
-import pathlib
 import shutil
 from unittest import mock
 
@@ -11,7 +10,7 @@ from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, configs, datasets
+from lfgp_dmc.launch import assemble, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
@@ -230,36 +229,6 @@ class ExamplesTest(_RunTest):
     (*_, last) = fixtures.rows(path / "metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
     self.train(config, "a", resume=True)
-
-  def test_mirror_images_double_what_was_shown(self):
-    dataset = fixtures.write_dataset(
-      self.folder / "shown", ("stack", "move_object"), 59, 4, pairs=20
-    )
-    for mirror, pairs in ((False, 15), (True, 30)):
-      config = fixtures.small_config(
-        dataset,
-        environment="",
-        main_task="stack",
-        mirror_demonstrations=mirror,
-        pairs_per_task=15,
-      )
-      shown = datasets.load(config, ["stack", "move_object"], (59, 4))
-      self.assertLen(shown["stack"], pairs)
-      self.assertLen(shown["move_object"], 15)
-
-  def test_published_examples_are_read_like_a_dataset(self):
-    data = pathlib.Path(__file__).parents[1] / "data"
-    folder = self.folder / "examples"
-    folder.mkdir()
-    with np.load(data / "published_lift.npz", allow_pickle=False) as part:
-      rows = {name: part[name][:50] for name in part.files}
-    rows["observation"] = rows["next_observation"]
-    np.savez(folder / "lift.npz", **rows)
-    config = self.config(**{"demonstrations": str(folder)})
-    shown = datasets.load(config, ["lift"], (59, 4))
-    self.assertLen(shown["lift"], 50)
-    with self.assertRaisesRegex(UserError, "stack.npz: missing"):
-      datasets.load(config, ["lift", "stack"], (59, 4))
 
 
 if __name__ == "__main__":
