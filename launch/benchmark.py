@@ -54,7 +54,7 @@ _OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
 
 
 def main() -> None:
-  """Measures, prints, and writes the CSV file if asked."""
+  """Measures, prints, and writes the CSV file of `--output`."""
   for task in _TASKS.value:
     command.check_choice("tasks", task, lfgp_dmc.ALL_TASKS)
   output = pathlib.Path(_OUTPUT.value) if _OUTPUT.value else None

@@ -1,5 +1,6 @@
-"""Clips of a policy in its environment, by whichever rule chooses its task."""
+"""Clips of a policy: of one intention, of play, or by the run's scheduler."""
 
+import contextlib
 import dataclasses
 from typing import Any
 
@@ -8,7 +9,6 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics, seeding
-from lfgp_dmc.acting import environments
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.pictures import recorder, task_switch
 from lfgp_dmc.runs import checkpoints, run_folder
@@ -16,63 +16,44 @@ from lfgp_dmc.runs import checkpoints, run_folder
 SCHEDULED = "scheduled"
 
 
-class Stage:
-  """A policy in its environment; each clip depends on its seed alone."""
+def play(
+  spec: policies.PolicySpec,
+  task: str,
+  seed: int,
+  look: recorder.Look,
+  is_play: bool = False,
+  **limits: Any,
+) -> recorder.Clip:
+  """Records one episode, in an environment of its own.
 
-  def __init__(
-    self,
-    spec: policies.PolicySpec,
-    task: str,
-    look: recorder.Look,
-    is_play: bool = False,
-  ):
-    """Builds the environment.
+  Args:
+    spec: the policy.
+    task: an intention, or `SCHEDULED`.
+    seed: of the reset, the policy and the choice of tasks.
+    look: how frames are made.
+    is_play: whether the expert goes from task to task.
+    **limits: see `recorder.record`.
 
-    Args:
-      spec: the policy.
-      task: an intention, or `SCHEDULED`.
-      look: how frames are made.
-      is_play: whether the expert goes from task to task.
-
-    Raises:
-      UserError: no pictures can be made here, or of this environment.
-    """
-    if fault := graphics.fault():
-      raise command.UserError(fault)
-    if task == SCHEDULED:
-      look = dataclasses.replace(look, scheduled_for=spec.main_task)
-    self._spec, self._task, self._is_play = spec, task, is_play
-    self._look, self._environment = look, spec.world.build()
-    with command.checked_input():
-      recorder.prepare(self._environment, look)
-
-  def play(self, seed: int, every: int = 0, **limits: Any) -> recorder.Clip:
-    """Records one episode.
-
-    Args:
-      seed: of the reset, the policy and the choice of tasks.
-      every: 50 ms a frame; 0: no frames.
-      **limits: see `recorder.record`.
-
-    Raises:
-      UserError: there is no scheduler to choose by.
-    """
-    environment: Any = environments.reseeded(
-      self._environment,
-      self._spec.world.factory(),
-      seeding.derive(seed, "clip"),
-    )
-    self._environment = environment
-    switch = task_switch.one_task(self._task)
-    if self._is_play:
-      tasks = lfgp_dmc.task_set(self._spec.main_task)
+  Raises:
+    UserError: no pictures can be made here, or of this environment, or there is
+      no scheduler.
+  """
+  if fault := graphics.fault():
+    raise command.UserError(fault)
+  switch = task_switch.one_task(task)
+  if task == SCHEDULED:
+    look = dataclasses.replace(look, scheduled_for=spec.main_task)
+    switch = scheduled(spec, seed)
+  environment = spec.world.build(seed=seeding.derive(seed, "clip"))
+  with contextlib.closing(environment):
+    if is_play:
+      tasks = lfgp_dmc.task_set(spec.main_task)
       switch = task_switch.Play(environment, tasks, seed)
-    elif self._task == SCHEDULED:
-      switch = scheduled(self._spec, seed)
-    look = dataclasses.replace(self._look, every=every)
-    first, actor = environment.reset(), self._spec.make()
+    first = environment.reset()
+    with command.checked_input():
+      recorder.prepare(environment, look)
     return recorder.record(
-      environment, actor, first, switch, seed, look, **limits
+      environment, spec.make(), first, switch, seed, look, **limits
     )
 
 

@@ -61,7 +61,7 @@ def sampling_actor(make_policy) -> Actor:
 
 
 def main() -> int:
-  """Collects, writes and prints what it wrote."""
+  """Collects, writes, and prints a summary."""
   output, tasks = _check_flags()
   try:
     found = collection.collect(

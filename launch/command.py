@@ -1,4 +1,4 @@
-"""What every command shares: starting up, and bad input in one clear line."""
+"""What every command shares: start-up, and one clear line for bad input."""
 
 import contextlib
 import logging
@@ -38,7 +38,7 @@ def run(
       flagfiles expanded.
   """
   graphics.choose_backend(render, window)
-  absl_logging.get_absl_handler().addFilter(_is_worth_saying)
+  absl_logging.get_absl_handler().addFilter(_is_relevant)
 
   def guarded_main(argv: Sequence[str]) -> int | None:
     if len(argv) > 1:
@@ -57,7 +57,7 @@ def run(
 
 
 def guarded(main: Callable[[], int | None]) -> int | None:
-  """Calls a command; bad input and failing disks are told in a few words."""
+  """Calls a command; reports bad input and failing disks in a line."""
   try:
     return main()
   except UserError as error:
@@ -73,10 +73,9 @@ def guarded(main: Callable[[], int | None]) -> int | None:
 
 @contextlib.contextmanager
 def checked_input() -> Iterator[None]:
-  """Turns what reading bad input raises into a `UserError`.
+  """Turns errors of reading the user's input into a `UserError`.
 
-  Only for blocks that read what the user gave: elsewhere a ValueError is a
-  fault of ours and deserves its traceback.
+  Elsewhere a ValueError is a fault of ours and deserves its traceback.
   """
   try:
     yield
@@ -106,8 +105,8 @@ def check_least(flag: str, value: int, least: int) -> int:
   return value
 
 
-def _is_worth_saying(record: logging.LogRecord) -> bool:
-  """Leaves out what libraries say about themselves when imported."""
+def _is_relevant(record: logging.LogRecord) -> bool:
+  """Filters import-time log noise of libraries."""
   is_theirs = any(name in record.pathname for name in ("dm_control", "OpenGL"))
   return not is_theirs or record.levelno >= logging.WARNING
 

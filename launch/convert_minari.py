@@ -29,7 +29,7 @@ _NUMBERS = ("seed", "control_hz")
 
 
 def main() -> None:
-  """Converts every task, and prints what it wrote."""
+  """Converts every task, and prints the names."""
   if not _DATASET.value or not _MINARI.value:
     raise UserError("give --dataset=FOLDER and --minari=NAMESPACE")
   try:

@@ -1,4 +1,4 @@
-"""The demonstrations of a run: read whole, or collected first if it may."""
+"""The demonstrations of a run: read, or collected first."""
 
 import pathlib
 import subprocess
@@ -33,7 +33,7 @@ def load(
     )
   folder = pathlib.Path(config.demonstrations)
   if not folder.exists():
-    collect_if_asked(config)
+    _collect(config)
   try:
     found = _read(folder, tasks, widths)
     _check_rate(config, found)
@@ -51,7 +51,7 @@ def load(
 def _counted(
   config: RunConfig, found: dict[str, Demonstrations]
 ) -> dict[str, Demonstrations]:
-  """As many pairs a task as the config says, the first ones.
+  """The first `pairs_per_task` pairs of each task.
 
   Raises:
     UserError: a task has fewer.
@@ -86,7 +86,7 @@ def _read(
 
 
 def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
-  """Raises ValueError if block tasks were shown at another control rate."""
+  """Raises ValueError if block tasks were demonstrated at another rate."""
   wrong = [
     f"{task} ({data.attributes['control_hz']})"
     for task, data in found.items()
@@ -95,11 +95,11 @@ def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
   if wrong and not config.environment:
     raise ValueError(
       f"config.control_hz is {config.control_hz}; {config.demonstrations} "
-      f"shows another rate: {', '.join(wrong)}"
+      f"has another rate: {', '.join(wrong)}"
     )
 
 
-def collect_if_asked(config: RunConfig) -> None:
+def _collect(config: RunConfig) -> None:
   """Collects the dataset if `config.collect_pairs` says so.
 
   Raises:

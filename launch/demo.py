@@ -174,8 +174,7 @@ def _film(
 ) -> pathlib.Path | None:
   """Renders evaluated episodes again: of the main task, then of others.
 
-  Last comes the stored policy on the main task. A success is shown where there
-  was one.
+  Last comes the stored policy on the main task. Successes are preferred.
   """
   if graphics.fault():
     return None

@@ -15,7 +15,7 @@ from lfgp_dmc.task_names import check_task
 
 @dataclasses.dataclass(frozen=True)
 class EnvironmentSpec:
-  """What it takes to build an environment; picklable.
+  """How to build an environment; picklable.
 
   Attributes:
     main_task: the task that is loaded.
@@ -59,7 +59,7 @@ class EnvironmentSpec:
     return functools.partial(self.build, show_rewards)
 
   def check(self) -> None:
-    """Raises ValueError unless `build` would find what it needs."""
+    """Raises ValueError if `build` would not find what it needs."""
     if self.environment:
       _imported(self.environment)
     else:
@@ -67,7 +67,7 @@ class EnvironmentSpec:
 
 
 def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:
-  """The tasks that an environment tells the success of, `main_task` first."""
+  """The tasks whose success is observable, `main_task` first."""
   spec = environment.observation_spec()
   found = []
   if isinstance(spec, Mapping):

@@ -72,7 +72,7 @@ def main() -> None:
 
 
 def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
-  """Who plays which tasks; an expert each task in its own environment."""
+  """Policies and their tasks; an expert plays each in its own environment."""
   if _RUN.value or not _EXPERT.value:
     spec = policies.find(_RUN.value, _EXPERT.value)
     return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
@@ -94,16 +94,16 @@ def _scripted(task: str) -> policies.PolicySpec:
 
 
 def choose_tasks(
-  asked: str, known: tuple[str, ...], default: str = ""
+  requested: str, known: tuple[str, ...], default: str = ""
 ) -> tuple[str, ...]:
   """The tasks of `--tasks`.
 
   Raises:
     UserError: one that is not known.
   """
-  if asked == "all":
+  if requested == "all":
     return known
-  names = tuple(name.strip() for name in asked.split(",") if name.strip())
+  names = tuple(name.strip() for name in requested.split(",") if name.strip())
   unknown = [name for name in names if name not in known]
   if unknown:
     raise UserError(

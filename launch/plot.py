@@ -5,11 +5,10 @@
 
 --figure=runs draws every task of each algorithm and main task; its other
 values are the paper's: main (all methods), multitask (every task of the
-multitask methods), transfer and play. --quantity=return draws returns instead
-of success. Seeds are one line: --estimate=mean draws mean and standard
-deviation as in the paper, iqm the interquartile mean and its stratified
-bootstrap interval, both both. The numbers of the paper's figures are in the CSV
-file beside each.
+multitask methods), transfer and play. There --estimate=mean draws mean and
+standard deviation of the seeds as in the paper, iqm the interquartile mean and
+its stratified bootstrap interval; a CSV file beside each figure has its
+numbers. --quantity=return draws returns instead of success.
 """
 
 import itertools
@@ -23,9 +22,7 @@ from lfgp_dmc.study import figures, run_results, statistics
 _EACH, _BOTH = "runs", "both"
 
 _RUNS = flags.DEFINE_list(
-  "runs",
-  [],
-  "Comma-separated folders of runs, folders of such folders, or patterns.",
+  "runs", [], "Folders of runs, folders of such folders, or patterns of either."
 )
 _OUTPUT = flags.DEFINE_string("output", "results", "Folder for the figures.")
 _FIGURE = flags.DEFINE_enum(
@@ -35,13 +32,10 @@ _QUANTITY = flags.DEFINE_enum(
   "quantity", run_results.SUCCESS, run_results.QUANTITIES, "What is drawn."
 )
 _ESTIMATE = flags.DEFINE_enum(
-  "estimate",
-  _BOTH,
-  [*statistics.ESTIMATORS, _BOTH],
-  "How seeds become a line; --figure=runs draws the mean.",
+  "estimate", _BOTH, [*statistics.ESTIMATORS, _BOTH], "How seeds become a line."
 )
 _FORMAT = flags.DEFINE_enum(
-  "format", "png", ["png", "pdf", "svg"], "Of the figures."
+  "format", "png", ["png", "pdf", "svg"], "File type."
 )
 
 
@@ -68,15 +62,13 @@ def _draw_each(runs: list[run_results.Run]) -> list[str]:
 
 def _draw_study(runs: list[run_results.Run]) -> list[str]:
   """One of the paper's figures."""
-  kinds = [_ESTIMATE.value]
-  if _ESTIMATE.value == _BOTH:
-    kinds = list(statistics.ESTIMATORS)
+  prefix = [] if _QUANTITY.value == run_results.SUCCESS else [_QUANTITY.value]
   notes = []
-  for kind in kinds:
-    name = [] if _QUANTITY.value == run_results.SUCCESS else [_QUANTITY.value]
-    path = _path(*name, _FIGURE.value, kind)
-    notes += figures.draw(_FIGURE.value, runs, path, _QUANTITY.value, kind)
-    print(path)
+  for kind in statistics.ESTIMATORS:
+    if _ESTIMATE.value in (kind, _BOTH):
+      path = _path(*prefix, _FIGURE.value, kind)
+      notes += figures.draw(_FIGURE.value, runs, path, _QUANTITY.value, kind)
+      print(path)
   return notes
 
 

@@ -1,7 +1,7 @@
-"""Who acts: the intentions of a run or a policy folder, or an expert.
+"""Policies by the names that commands take: of a folder, or the expert.
 
-Everything here can be pickled into worker processes, and imports the
-simulator or torch only when it is called.
+Everything here can be pickled into worker processes, and imports the simulator
+or torch only when it is called.
 """
 
 import dataclasses
@@ -22,19 +22,19 @@ SCRIPTED = "scripted"
 
 @dataclasses.dataclass(frozen=True)
 class PolicySpec:
-  """An actor to be made, and where it is at home."""
+  """How to make a policy, and its environment."""
 
   make: Callable[[], Actor]  # picklable
   name: str  # for tables and sidecars
   world: EnvironmentSpec
-  tasks: tuple[str, ...]  # what it can do, the main task first
+  tasks: tuple[str, ...]  # its intentions, the main task first
   folder: pathlib.Path | None = None  # of a run
   config: dict[str, Any] = dataclasses.field(default_factory=dict)
   env_step: int = 0  # how long it was trained
 
   @property
   def main_task(self) -> str:
-    """The task whose environment it is at home in."""
+    """The task of its environment."""
     return self.world.main_task
 
 
@@ -58,7 +58,7 @@ def stored_policy(folder: str) -> Actor:
 def find(
   run: str, expert: str, task: str = "", control_hz: int = 20
 ) -> PolicySpec:
-  """The actor that `--run` or `--expert` names.
+  """The policy that `--run` or `--expert` names.
 
   Args:
     run: a run or policy folder, or "".

@@ -16,6 +16,7 @@ clip (.mp4, .gif) or a picture (.png; of an episode a film strip); what it shows
 goes into a JSON file beside it.
 """
 
+import functools
 import pathlib
 import re
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc.launch import clips, command, policies
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.pictures import film_strips, recorder, task_switch, video
+from lfgp_dmc.pictures import film_strips, recorder, video
 from lfgp_dmc.task_names import CONTROL_RATES
 
 _RUN = flags.DEFINE_string(
@@ -107,20 +108,14 @@ def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
   task = _TASK.value or spec.main_task
   command.check_choice("task", task, (*spec.tasks, clips.SCHEDULED))
   output = _output(f"{spec.name}_{'play' if is_play else task}")
-  stage = clips.Stage(spec, task, look, is_play)
   goal = spec.main_task if task == clips.SCHEDULED else task
   steps, until = _STEPS.value or None, goal if _UNTIL.value else None
+  limits = {"max_steps": steps, "until_success_of": until}
   played = [
-    stage.play(seed, look.every, max_steps=steps, until_success_of=until)
-    for seed in seeds
+    clips.play(spec, task, seed, look, is_play, **limits) for seed in seeds
   ]
   shown = [
-    {
-      "seed": seed,
-      "steps": clip.steps,
-      "first_success": clip.first_success,
-      "intentions": task_switch.spans(clip.labels, look.every / clip.checks),
-    }
+    {"seed": seed, **clip.summary(look)}
     for seed, clip in zip(seeds, played, strict=True)
   ]
   metadata = {
@@ -155,9 +150,9 @@ def _film_strips(look: recorder.Look) -> None:
   cells, shown = [], []
   for spec in specs:
     task = spec.main_task
-    stage = clips.Stage(spec, task, look)
+    play = functools.partial(clips.play, spec, task)
     try:
-      row, seed, step = film_strips.row(stage.play, task, seeds, _STRIP.value)
+      row, seed, step = film_strips.row(play, task, seeds, look, _STRIP.value)
     except ValueError as error:
       raise UserError(
         f"{spec.name}: {error}; try more --attempts or another --seed"
@@ -173,10 +168,11 @@ def _picture_of_resets(look: recorder.Look, seeds, columns: int) -> None:
   """The world after resets, before anybody acts."""
   task = _TASK.value or lfgp_dmc.MAIN_TASKS[0]
   output = _output(f"reset_{task}", (".png",))
-  stage = clips.Stage(policies.find("", policies.SCRIPTED, task), task, look)
-  pictures = [stage.play(seed, every=1, max_steps=0).frames for seed in seeds]
+  expert = policies.find("", policies.SCRIPTED, task)
+  resets = [clips.play(expert, task, seed, look, max_steps=0) for seed in seeds]
+  frames = video.grid([clip.frames for clip in resets], columns)
   metadata = {"task": task, "seed": seeds[0], "camera": look.camera}
-  video.write(output, video.grid(pictures, columns), metadata=metadata)
+  video.write(output, frames, metadata=metadata)
   print(output)
 
 

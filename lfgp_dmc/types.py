@@ -55,7 +55,7 @@ class Actor(Protocol):
 
 @runtime_checkable
 class Agent(Protocol):
-  """What a run trains; it is an `ActingAgent` or a `SupervisedAgent`."""
+  """Trained by a run; an `ActingAgent` or a `SupervisedAgent`."""
 
   tasks: tuple[str, ...]
 
@@ -85,7 +85,7 @@ class Agent(Protocol):
 
 @runtime_checkable
 class ActingAgent(Agent, Protocol):
-  """Learns from what it does; see `lfgp_dmc/runs/loop.py`."""
+  """Learns by acting; see `lfgp_dmc/runs/loop.py`."""
 
   def prepare(self, progress_bar: bool) -> None:
     """Work before a new run's first step, such as a warm start; once."""

@@ -132,7 +132,7 @@ class FeatureReader:
     return out.astype(np.float32)
 
   def _map_linear_part(self, size: int) -> None:
-    """Makes `matrix @ sensordata + offset`: all but turns, history, forces."""
+    """`matrix @ sensordata + offset`: all but rotations, history and forces."""
     blue, green = self._blocks
     matrix = np.zeros((OBSERVATION_SIZE, size))
     offset = np.zeros(OBSERVATION_SIZE)

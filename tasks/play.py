@@ -12,6 +12,7 @@ from lfgp_dmc.task_names import MAIN_TASKS
 from lfgp_dmc.tasks import control, initialisers, observables
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.arena import PlayArena
+from lfgp_dmc.tasks.entities import panda_links
 from lfgp_dmc.tasks.goals import GOALS, terms
 from lfgp_dmc.tasks.holds import Holds
 from lfgp_dmc.tasks.world import World
@@ -71,7 +72,7 @@ class PlayTask(composer.Task):
 
   def after_compile(self, physics, random_state) -> None:
     """Resolves addresses, with the arm at home."""
-    physics.bind(self.world.panda.joints).qpos = initialisers.HOME
+    physics.bind(self.world.panda.joints).qpos = panda_links.HOME
     physics.forward()
     self.world.control.after_compile(physics)
     self.world.reader.after_compile(physics)
@@ -110,7 +111,7 @@ class PlayTask(composer.Task):
   def _begin(self, physics) -> None:
     physics.forward()
     fingers = np.array(physics.bind(self.world.panda.finger_joints).qpos)
-    self.world.reader.reset_history(fingers / initialisers.FINGER_TRAVEL)
+    self.world.reader.reset_history(fingers / panda_links.FINGER_TRAVEL)
     self._action = _NO_ACTION
     self._holds.clear()
     self._is_out = [False, False]

@@ -20,7 +20,7 @@ def measure(
   """Plays uniform random actions.
 
   In every other episode each is held for ten steps on average, so that the
-  hand gets about and rams what it meets.
+  hand travels and hits things.
 
   Args:
     tasks: in whose environments.

@@ -28,8 +28,8 @@ _RAL: dict[str, Any] = {
 # Ours: the fewest hours on two cores to the same success, from runs and trials
 # in results/learning/. Control at 5 Hz (the authors' later rate) makes nine
 # thousand pairs four times as much time; the intentions start from cloning and
-# stay near it; discriminators recognise a task's end, from positions alone:
-# velocities and history give away whose success it is.
+# stay near it; discriminators recognise a task's end, from positions alone,
+# since velocities and history give away whose success it is.
 _FAST: dict[str, Any] = {
   "bfloat16": True,
   "control_hz": 5,

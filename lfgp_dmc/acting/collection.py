@@ -7,6 +7,7 @@ between resets) depends on the seed and its number alone, so the data are the
 same with any number of workers.
 """
 
+import contextlib
 import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
@@ -79,11 +80,8 @@ def collect(
   with tqdm.tqdm(
     total=(pairs + finals) * len(piles), unit="pair", disable=not progress
   ) as bar:
-    if collection == "play":
-      bar.set_description("play")
-      _fill(plan, piles, [None], workers, bar)
-    else:
-      _fill(plan, piles, [*piles], workers, bar)
+    units: list[str | None] = [None] if collection == "play" else [*piles]
+    _fill(plan, piles, units, workers, bar)
   return {task: pile.collected() for task, pile in piles.items()}
 
 
@@ -95,14 +93,12 @@ def _fill(
   bar: tqdm.tqdm,
 ) -> None:
   """Fills the piles, one unit of work (a task, or play) after the other."""
-  open_units = _OpenUnits(units)
+  left = list(units)
   make = functools.partial(Collector, plan)
-  results = work.ordered(make, iter(open_units), workers)
-  try:
+  with contextlib.closing(work.ordered(make, _jobs(left), workers)) as results:
     for unit in units:
       wanted = piles if unit is None else {unit: piles[unit]}
-      if unit is not None:
-        bar.set_description(unit)
+      bar.set_description(unit or "play")
       while not all(pile.is_full for pile in wanted.values()):
         of_unit, attempts = next(results)
         if of_unit != unit:  # begun before it was full
@@ -110,29 +106,18 @@ def _fill(
         for attempt in attempts:
           if attempt.task in wanted:
             bar.update(wanted[attempt.task].add(attempt))
-      open_units.close(unit)
-  finally:
-    results.close()
+      left.remove(unit)
 
 
-class _OpenUnits:
-  """Endless jobs: numbered chunks of the first unit not yet closed."""
-
-  def __init__(self, units: list[str | None]):
-    self._units = list(units)
-
-  def close(self, unit: str | None) -> None:
-    """Yields no more jobs of a unit."""
-    self._units.remove(unit)
-
-  def __iter__(self) -> Iterator[Job]:
-    while self._units:
-      unit = self._units[0]
-      size = 1 if unit is None else _CHUNK
-      for start in itertools.count(0, size):
-        if not self._units or self._units[0] != unit:
-          break
-        yield unit, range(start, start + size)
+def _jobs(units: list[str | None]) -> Iterator[Job]:
+  """Numbered chunks of the first unit, until it is removed."""
+  while units:
+    unit = units[0]
+    size = 1 if unit is None else _CHUNK
+    for start in itertools.count(0, size):
+      if not units or units[0] != unit:
+        break
+      yield unit, range(start, start + size)
 
 
 class _Pile:

@@ -94,11 +94,12 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
     environment's own reward.
   """
   own = 0.0 if timestep.reward is None else float(timestep.reward)
-  shown = timestep.observation
-  if not isinstance(shown, Mapping):
-    shown = {}
+  observed = timestep.observation
+  if not isinstance(observed, Mapping):
+    observed = {}
   rewards = [
-    float(shown.get(observations.REWARD_PREFIX + task, own)) for task in tasks
+    float(observed.get(observations.REWARD_PREFIX + task, own))
+    for task in tasks
   ]
   return np.asarray(rewards, np.float32)
 
@@ -122,10 +123,10 @@ def tasks_with_rewards(
 
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:
   """Whether `task` has succeeded; None if it is not observable."""
-  shown = timestep.observation
-  if not isinstance(shown, Mapping):
+  observed = timestep.observation
+  if not isinstance(observed, Mapping):
     return None
-  value = shown.get(observations.SUCCESS_PREFIX + task)
+  value = observed.get(observations.SUCCESS_PREFIX + task)
   return None if value is None else bool(np.all(value))
 
 

@@ -16,15 +16,6 @@ DTYPES = {
   "episode": np.dtype(np.int32),
   "is_last": np.dtype(np.bool_),
 }
-_ATTRIBUTES = (
-  "schema_version",
-  "task",
-  "main_task",
-  "collection",
-  "expert",
-  "seed",
-  "control_hz",
-)
 
 
 def of_arrays(
@@ -40,58 +31,52 @@ def of_arrays(
     action_size: A of the environment; None accepts any.
 
   Returns:
-    One phrase a fault; empty if there is none.
+    One phrase a fault.
   """
   faults = [f"missing dataset {k!r}" for k in DTYPES if k not in arrays]
-  faults += _wrong_dtypes(arrays)
-  if faults:
-    return faults
-  faults += _wrong_shapes(arrays, observation_size, action_size)
-  if faults:
-    return faults
-  return _wrong_values(arrays) + _wrong_episodes(arrays)
-
-
-def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
-  """Faults of the attributes; `task` is the one expected (None: any)."""
-  faults = [f"missing attribute {k!r}" for k in _ATTRIBUTES
-            if k not in attributes]  # fmt: skip
-  if faults:
-    return faults
-  version = attributes["schema_version"]
-  if version != SCHEMA_VERSION:
-    faults.append(f"schema_version is {version!r}; valid: {SCHEMA_VERSION}")
-  if task is not None and attributes["task"] != task:
-    faults.append(f"task is {attributes['task']!r}; expected {task!r}")
-  if attributes["collection"] not in COLLECTIONS:
-    faults.append(
-      f"collection is {attributes['collection']!r}; "
-      f"valid: {', '.join(COLLECTIONS)}"
-    )
-  for name in ("task", "main_task", "expert"):
-    if not isinstance(attributes[name], str) or not attributes[name]:
-      faults.append(f"{name} is {attributes[name]!r}; valid: a name")
-  if not _is_number(attributes["seed"], np.integer, 0):
-    faults.append(f"seed is {attributes['seed']!r}; valid: an integer >= 0")
-  hertz = attributes["control_hz"]
-  if not _is_number(hertz, np.number, 0) or hertz == 0:
-    faults.append(f"control_hz is {hertz!r}; valid: a number above 0")
-  return faults
-
-
-def _is_number(value: Any, kind: type, least: float) -> bool:
-  array = np.asarray(value)
-  if array.shape or not np.issubdtype(array.dtype, kind):
-    return False
-  return bool(np.isfinite(array) and array >= least)
-
-
-def _wrong_dtypes(arrays: Mapping[str, np.ndarray]) -> list[str]:
-  return [
+  faults += [
     f"{name!r} is {arrays[name].dtype}; valid: {dtype}"
     for name, dtype in DTYPES.items()
     if name in arrays and arrays[name].dtype != dtype
   ]
+  faults = faults or _wrong_shapes(arrays, observation_size, action_size)
+  return faults or _wrong_values(arrays) + _wrong_episodes(arrays)
+
+
+def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
+  """Faults of the attributes; `task` is the expected one (None: any)."""
+  faults = [f"missing attribute {k!r}" for k in _VALID if k not in attributes]
+  if faults:
+    return faults
+  if task is not None and attributes["task"] != task:
+    faults.append(f"task is {attributes['task']!r}; expected {task!r}")
+  return faults + [
+    f"{name} is {attributes[name]!r}; valid: {valid}"
+    for name, (is_valid, valid) in _VALID.items()
+    if not is_valid(attributes[name])
+  ]
+
+
+def _is_name(value: Any) -> bool:
+  return isinstance(value, str) and bool(value)
+
+
+def _is_number(value: Any, kind: type = np.number) -> bool:
+  array = np.asarray(value)
+  is_number = not array.shape and np.issubdtype(array.dtype, kind)
+  return is_number and bool(np.isfinite(array) and array >= 0)
+
+
+# Attribute -> its check, and what is valid.
+_VALID = {
+  "schema_version": (lambda v: v == SCHEMA_VERSION, SCHEMA_VERSION),
+  "task": (_is_name, "a name"),
+  "main_task": (_is_name, "a name"),
+  "collection": (lambda v: v in COLLECTIONS, ", ".join(COLLECTIONS)),
+  "expert": (_is_name, "a name"),
+  "seed": (lambda v: _is_number(v, np.integer), "an integer >= 0"),
+  "control_hz": (lambda v: _is_number(v) and v > 0, "a number above 0"),
+}
 
 
 def _wrong_shapes(arrays, observation_size, action_size) -> list[str]:

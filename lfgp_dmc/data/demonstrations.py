@@ -17,7 +17,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from lfgp_dmc.data import demonstration_checks, files
+from lfgp_dmc.data import demonstration_checks as checks
+from lfgp_dmc.data import files
 
 SUFFIX = ".hdf5"
 
@@ -43,7 +44,7 @@ class Demonstrations:
 
   def arrays(self) -> dict[str, np.ndarray]:
     """The five arrays by name."""
-    return {k: getattr(self, k) for k in demonstration_checks.DTYPES}
+    return {k: getattr(self, k) for k in checks.DTYPES}
 
   def head(self, pairs: int) -> "Demonstrations":
     """The first `pairs` pairs."""
@@ -88,12 +89,12 @@ def write(
   """
   path = pathlib.Path(path)
   attributes = {
-    "schema_version": demonstration_checks.SCHEMA_VERSION,
+    "schema_version": checks.SCHEMA_VERSION,
     **(demonstrations.attributes if attributes is None else attributes),
   }
   arrays = demonstrations.arrays()
-  faults = demonstration_checks.of_attributes(attributes, None)
-  faults += demonstration_checks.of_arrays(arrays, None, None)
+  faults = checks.of_attributes(attributes, None)
+  faults += checks.of_arrays(arrays, None, None)
   if faults:
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
@@ -131,13 +132,11 @@ def read(
   except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
-  faults = demonstration_checks.of_attributes(attributes, task)
-  faults += demonstration_checks.of_arrays(
-    arrays, observation_size, action_size
-  )
+  faults = checks.of_attributes(attributes, task)
+  faults += checks.of_arrays(arrays, observation_size, action_size)
   if faults:
     raise DatasetError(f"{path}: {'; '.join(faults)}")
-  known = {name: arrays[name] for name in demonstration_checks.DTYPES}
+  known = {name: arrays[name] for name in checks.DTYPES}
   return Demonstrations(**known, attributes=attributes)
 
 
@@ -211,7 +210,7 @@ def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
   """Every top-level dataset and every attribute, as NumPy and Python values."""
   arrays = {}
   with h5py.File(path, "r") as file:
-    for name in demonstration_checks.DTYPES:
+    for name in checks.DTYPES:
       if name in file and isinstance(file[name], h5py.Dataset):
         arrays[name] = file[name][()]
     attributes = {

@@ -23,7 +23,7 @@ def open_rows(
 
   Args:
     path: an npy file.
-    shape: what it must have, [size, width]; width None accepts any.
+    shape: its [size, width]; width None accepts any.
     read_only: whether it is never written to.
 
   Raises:

@@ -1,17 +1,22 @@
-"""Plays one episode and makes frames of it, with what is going on on top."""
+"""Plays one episode and makes frames of it, with a caption on each."""
 
 import dataclasses
 import itertools
 from collections.abc import Callable
+from typing import Any
 
 import dm_env
 import numpy as np
 
 from lfgp_dmc.acting import environments, rollout
+from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.pictures import video
 from lfgp_dmc.types import Actor
 
+# Control step, time step -> the task that acts now.
 Switch = Callable[[int, dm_env.TimeStep], str]
+
+_TAIL = 20  # 50 ms checks shown after a success
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,9 +42,19 @@ class Clip:
   steps: int
   checks: int = 1  # 50 ms in a control step
 
+  def summary(self, look: Look) -> dict[str, Any]:
+    """For a sidecar: steps, successes, the step each intention began at."""
+    starts: list[dict[str, Any]] = []
+    for i, label in enumerate(self.labels):
+      if i == 0 or label != self.labels[i - 1]:
+        step = i * look.every // self.checks
+        starts.append({"from_step": step, "intention": label})
+    return {"steps": self.steps, "first_success": self.first_success,
+            "intentions": starts}  # fmt: skip
+
 
 def record(
-  environment: dm_env.Environment,
+  environment: Any,
   actor: Actor,
   first: dm_env.TimeStep,
   choose: Switch,
@@ -53,85 +68,35 @@ def record(
   Args:
     environment: a Composer environment, just reset.
     actor: begins a task whenever `choose` names another.
-    first: the reset's timestep.
-    choose: control step, timestep -> the task that acts now.
+    first: the reset's time step.
+    choose: the task that acts.
     seed: of the actor.
     look: how frames are made.
     max_steps: control steps at most; None: the whole episode.
     until_success_of: stop one second after this task's success.
 
-  Returns:
-    The clip.
+  Raises:
+    ValueError: see `prepare`.
   """
   prepare(environment, look)
   recorder = _Recorder(environment, actor, first, choose, seed, look)
-  clip, tail = recorder.clip, 0
+  clip = recorder.clip
   played = rollout.steps(environment, first, recorder.act)
   try:
     for step in itertools.islice(played, max_steps):
       recorder.timestep = step.timestep
       clip.steps += 1
-      for name in set(_successes(step.timestep)) - set(clip.first_success):
-        clip.first_success[name] = clip.steps
-      if until_success_of in clip.first_success:
-        tail += clip.checks
-        if tail > _TAIL:
-          return clip
+      for name, value in step.timestep.observation.items():
+        if name.startswith(SUCCESS_PREFIX) and np.all(value):
+          task = name.removeprefix(SUCCESS_PREFIX)
+          clip.first_success.setdefault(task, clip.steps)
+      success = clip.first_success.get(until_success_of or "")
+      if success and (clip.steps - success + 1) * clip.checks > _TAIL:
+        return clip
     recorder.begin_step()
     return clip
   finally:
-    recorder.close()
-
-
-class _Recorder:
-  """Takes the frames, between control steps too where there is more to see."""
-
-  def __init__(self, environment, actor, first, choose, seed: int, look: Look):
-    checks = getattr(environment, "checks", 1)
-    self.clip = Clip([], [], {}, 0, checks)
-    self.timestep: dm_env.TimeStep = first
-    self._task = ""
-    self._environment, self._look = environment, look
-    self._actor, self._choose, self._seed = actor, choose, seed
-    if checks > 1:
-      environment.on_check = self._on_check
-
-  def act(self, observation: np.ndarray) -> np.ndarray:
-    """The action of the task whose turn it is."""
-    self.begin_step()
-    return self._actor.act(observation)
-
-  def begin_step(self) -> None:
-    """Begins the task whose turn it is; takes the frame if it is due."""
-    clip = self.clip
-    wanted = self._choose(clip.steps, self.timestep)
-    if wanted != self._task:
-      self._task = wanted
-      self._actor.begin(wanted, self._seed + clip.steps)
-    self._check = 0
-    self._take(is_last=self.timestep.last())
-
-  def close(self) -> None:
-    """Lets go of the environment."""
-    if self.clip.checks > 1:
-      self._environment.on_check = None  # type: ignore[attr-defined]
-
-  def _on_check(self) -> None:
-    self._check += 1
-    if self._check < self.clip.checks:  # the next step begins with the last
-      self._take()
-
-  def _take(self, is_last: bool = False) -> None:
-    clip, look = self.clip, self._look
-    now = clip.steps * clip.checks + self._check
-    if look.every and (now % look.every == 0 or is_last):
-      clip.frames.append(
-        _frame(self._environment, self.timestep, self._task, clip, look)
-      )
-      clip.labels.append(self._task)
-
-
-_TAIL = 20  # 50 ms checks shown after a success
+    environment.on_check = None
 
 
 def prepare(environment: dm_env.Environment, look: Look) -> None:
@@ -154,31 +119,55 @@ def prepare(environment: dm_env.Environment, look: Look) -> None:
     model.vis.quality.offsamples = 0
 
 
-def _successes(timestep: dm_env.TimeStep) -> list[str]:
-  prefix = "success/"
-  return [
-    name.removeprefix(prefix)
-    for name, value in timestep.observation.items()
-    if name.startswith(prefix) and bool(value)
-  ]
+class _Recorder:
+  """Acts and takes frames, also between control steps at low rates."""
 
+  def __init__(
+    self, environment: Any, actor: Actor, first, choose, seed: int, look: Look
+  ):
+    self.clip = Clip([], [], {}, 0, getattr(environment, "checks", 1))
+    self.timestep: dm_env.TimeStep = first
+    self._environment, self._look = environment, look
+    self._actor, self._choose, self._seed = actor, choose, seed
+    self._task, self._check = "", 0
+    environment.on_check = self._on_check
 
-def _frame(environment, timestep, task: str, clip: Clip, look: Look):
-  frame = environment.physics.render(
-    look.height, look.width, camera_id=look.camera
-  )
-  if not look.overlay:
-    return frame
-  goal = look.scheduled_for or task
-  has_succeeded = bool(environments.has_succeeded(timestep, goal))
-  left, success = _words(task), "success   " if has_succeeded else ""
-  if look.scheduled_for:
-    left = f"scheduler: {left}"
-    success = f"{_words(goal)} {success}" if has_succeeded else ""
-  return video.label(
-    frame, left, f"{success}step {clip.steps}", highlight=has_succeeded
-  )
+  def act(self, observation: np.ndarray) -> np.ndarray:
+    """The action of the task that acts now."""
+    self.begin_step()
+    return self._actor.act(observation)
 
+  def begin_step(self) -> None:
+    """Switches the task, and takes the frame that is due."""
+    task = self._choose(self.clip.steps, self.timestep)
+    if task != self._task:
+      self._task = task
+      self._actor.begin(task, self._seed + self.clip.steps)
+    self._check = 0
+    self._take(is_last=self.timestep.last())
 
-def _words(task: str) -> str:
-  return task.replace("_", " ")
+  def _on_check(self) -> None:
+    self._check += 1
+    if self._check < self.clip.checks:  # the next step begins with the last
+      self._take()
+
+  def _take(self, is_last: bool = False) -> None:
+    clip, look = self.clip, self._look
+    now = clip.steps * clip.checks + self._check
+    if not look.every or (now % look.every and not is_last):
+      return
+    frame = self._environment.physics.render(
+      look.height, look.width, camera_id=look.camera
+    )
+    clip.frames.append(self._captioned(frame) if look.overlay else frame)
+    clip.labels.append(self._task)
+
+  def _captioned(self, frame: np.ndarray) -> np.ndarray:
+    main_task = self._look.scheduled_for
+    goal, left, right = main_task or self._task, self._task, "success   "
+    if main_task:
+      left, right = f"scheduler: {left}", f"{main_task} success   "
+    has_succeeded = bool(environments.has_succeeded(self.timestep, goal))
+    right = f"{right if has_succeeded else ''}step {self.clip.steps}"
+    left, right = left.replace("_", " "), right.replace("_", " ")
+    return video.label(frame, left, right, highlight=has_succeeded)

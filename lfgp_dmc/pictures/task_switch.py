@@ -1,6 +1,5 @@
 """Which task acts when: one alone, or play from one to the next."""
 
-import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,16 +18,10 @@ def one_task(task: str) -> Switch:
 
 
 class Play:
-  """Another random task after each success, without a reset, or in time."""
+  """Another random task after each success or 120 steps, without a reset."""
 
   def __init__(self, environment: Any, tasks: Sequence[str], seed: int):
-    """Chooses the first task.
-
-    Args:
-      environment: has `clear_success`.
-      tasks: to choose from, at least two.
-      seed: of the choices.
-    """
+    """Chooses the first of two or more tasks; `clear_success` is needed."""
     self._environment, self._tasks = environment, tasks
     self._random = seeding.generator(seed, "play")
     self._task = ""
@@ -46,18 +39,3 @@ class Play:
     others = [task for task in self._tasks if task != self._task]
     self._task = others[self._random.integers(len(others))]
     self._since = step
-
-
-def spans(labels: Sequence[str], every: float) -> list[dict[str, int | str]]:
-  """The control step from which each intention acted.
-
-  Args:
-    labels: the intention of each frame.
-    every: control steps a frame.
-  """
-  starts: list[dict[str, int | str]] = []
-  frames = 0
-  for label, group in itertools.groupby(labels):
-    starts.append({"from_step": int(every * frames), "intention": label})
-    frames += len(list(group))
-  return starts

@@ -19,16 +19,13 @@ def write(
   fps: float = 20.0,
   metadata: Mapping[str, Any] | None = None,
 ) -> pathlib.Path:
-  """Writes frames and, beside them, `NAME.json`.
+  """Writes frames and, beside them, `NAME.json`; returns the path.
 
   Args:
     path: `.mp4`, `.gif`, or `.png` (all frames side by side: a film strip).
     frames: at least one, uint8 [height, width, 3], all of one size.
     fps: frames a second.
     metadata: for the sidecar, beside size and rate.
-
-  Returns:
-    The path written.
 
   Raises:
     ValueError: an unknown suffix, no frames, or frames of another kind.
@@ -90,16 +87,13 @@ def grid(
 def label(
   frame: np.ndarray, left: str, right: str, highlight: bool = False
 ) -> np.ndarray:
-  """Draws a caption on a dark strip along the top of a frame.
+  """Draws captions on a dark or green strip along the top of a frame's copy.
 
   Args:
-    frame: uint8 [height, width, 3]; left unchanged.
+    frame: uint8 [height, width, 3].
     left: such as the intention's name.
     right: such as the step and the success.
-    highlight: a green strip instead of a dark one.
-
-  Returns:
-    uint8 [height, width, 3].
+    highlight: whether the strip is green.
   """
   image = Image.fromarray(frame)
   size = max(10, frame.shape[0] // 20)
@@ -118,14 +112,10 @@ def _checked(frames: Sequence[np.ndarray]) -> list[Any]:
   if not frames:
     raise ValueError("no frames to write")
   for frame in frames:
-    shape = frame.shape
+    shape, first = frame.shape, frames[0].shape
     if frame.dtype != np.uint8 or len(shape) != 3 or shape[2] != 3:
-      raise ValueError(
-        f"a frame is {frame.dtype} {list(shape)}; valid: uint8 "
-        "[height, width, 3]"
-      )
-    if shape != frames[0].shape:
-      raise ValueError(
-        f"frames of two sizes: {list(frames[0].shape)} and {list(shape)}"
-      )
+      kind = f"{frame.dtype} {list(shape)}"
+      raise ValueError(f"a frame is {kind}; valid: uint8 [height, width, 3]")
+    if shape != first:
+      raise ValueError(f"frames of two sizes: {list(first)} and {list(shape)}")
   return frames

@@ -40,7 +40,7 @@ class Run:
       folder: the run's, locked.
       agent: freshly built.
       environment: where an acting agent acts.
-      replay: what it learns from; None for a supervised one.
+      replay: of an acting agent.
       schedule: when things happen.
       evaluate: env_step -> episodes of the policy that the folder holds.
       config: what `config.json` keeps, JSON-able.

@@ -119,7 +119,7 @@ def resume(
 
 
 def settings(config: Mapping[str, Any]) -> dict[str, Any]:
-  """What a run was started with: its config without what it added."""
+  """A run's config without the fields that the run added."""
   return {k: v for k, v in config.items() if k != POLICY_FIELD}
 
 
@@ -144,10 +144,10 @@ def read_config(path: files.Path) -> dict[str, Any]:
 
 
 def _differing_fields(
-  known: Mapping[str, Any], asked: Mapping[str, Any]
+  known: Mapping[str, Any], given: Mapping[str, Any]
 ) -> list[str]:
   """What differs between two configs: `agent.xi (45, now 90)`, ..."""
-  first, second = _leaves(known), _leaves(asked)
+  first, second = _leaves(known), _leaves(given)
   names = [*first, *(name for name in second if name not in first)]
   return [
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"

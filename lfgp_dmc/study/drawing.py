@@ -129,4 +129,4 @@ def _finish(axes, task: str, end: int, is_share: bool) -> None:
 
 
 def _title(task: str) -> str:
-  return task.replace("_", "-").title()
+  return "all four" if task == "all" else task.replace("_", "-").title()

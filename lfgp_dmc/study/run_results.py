@@ -1,7 +1,6 @@
 """Runs of a study, read from their `config.json` and `evaluation.csv` alone."""
 
 import glob
-import os
 import pathlib
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -14,7 +13,7 @@ from lfgp_dmc.runs import run_folder
 
 SUCCESS, RETURN = "success", "return"
 QUANTITIES = (SUCCESS, RETURN)
-# Their last evaluation is their result.
+# Cloning takes no environment steps: its last evaluation is its result.
 WITHOUT_STEPS = ("bc", "bc_less", "multitask_bc")
 
 
@@ -72,20 +71,14 @@ def method_of(config: Mapping[str, Any]) -> str:
   """The method that a run's config describes.
 
   Returns:
-    The algorithm; after it `_transfer` if a field about transfer names a run,
-    else `_play` if the demonstrations' folder is named so, as `stack_play`.
+    The algorithm; after it `_transfer` if the run starts from another one, else
+    `_play` if the demonstrations' folder is named so, as `stack_play`.
   """
   algorithm = str(config.get("algorithm", "?"))
-  agent = config.get("agent")
-  fields = {**config, **(agent if isinstance(agent, Mapping) else {})}
-  # Strings alone: numbers such as transfer_updates are set without a transfer.
-  if any("transfer" in k and v and isinstance(v, str)
-         for k, v in fields.items()):  # fmt: skip
-    return f"{algorithm}_transfer"
   folder = pathlib.Path(config.get("demonstrations") or "")
-  if "play" in folder.name.split("_"):
-    return f"{algorithm}_play"
-  return algorithm
+  if config.get("transfer_from"):
+    return f"{algorithm}_transfer"
+  return f"{algorithm}_play" if "play" in folder.name.split("_") else algorithm
 
 
 def curve(
@@ -136,14 +129,14 @@ def _points(run: Run, task: str, quantity: str) -> dict[int, float]:
 
 
 def _expanded(patterns: Sequence[files.Path]) -> list[pathlib.Path]:
-  """Runs themselves, and the runs inside folders that are none."""
-  found: dict[pathlib.Path, None] = {}
-  for pattern in map(str, patterns):
-    matches = [m for m in sorted(glob.glob(pattern)) if os.path.isdir(m)]
-    for folder in map(pathlib.Path, matches or [pattern]):
-      inside = sorted(folder.glob(f"*/{run_folder.CONFIG_NAME}"))
-      if (folder / run_folder.CONFIG_NAME).is_file() or not inside:
-        found[folder] = None
-      else:
-        found |= dict.fromkeys(path.parent for path in inside)
-  return list(found)
+  """Runs that match, and those in folders that do; else the pattern itself."""
+  found: list[pathlib.Path] = []
+  for pattern in patterns:
+    configs = [
+      config
+      for depth in ("", "*/")
+      for config in glob.glob(f"{pattern}/{depth}{run_folder.CONFIG_NAME}")
+    ]
+    runs = [pathlib.Path(config).parent for config in sorted(configs)]
+    found += runs or [pathlib.Path(pattern)]
+  return list(dict.fromkeys(found))

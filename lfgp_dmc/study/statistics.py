@@ -3,7 +3,7 @@
 The paper reports mean and standard deviation. With few seeds the interquartile
 mean with stratified bootstrap intervals is the steadier summary (Agarwal et
 al., "Deep reinforcement learning at the edge of the statistical precipice").
-rliable, their library, needs an older pandas than today's; SciPy has its parts.
+Their library, rliable, needs an older pandas than today's; SciPy has its parts.
 
 Scores are float [R, K, T]: runs, tasks, and points such as environment steps or
 numbers of demonstrations.

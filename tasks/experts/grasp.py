@@ -66,7 +66,7 @@ def reach(
     offset = offset or (0.0, 0.0)
   elif offset is None:
     return _push_free(view, target)
-  goal = (target.x + offset[0], target.y + offset[1], _low(target, height))
+  goal = (target.x + offset[0], target.y + offset[1], _tcp_z(target, height))
   if is_between_fingers(view, target):
     return Command(motion.servo(view, goal), OPEN, noise=0.6)
   # Closed fingers wait above until they are open.
@@ -88,13 +88,13 @@ def grasp(view: View, target: BlockView, square: bool = False) -> Command:
     if side and view.opening > 0.92:
       return _sweep(view, target, side)
     if _is_centred(view, target):
-      goal = (target.x, target.y, _low(target))
+      goal = (target.x, target.y, _tcp_z(target))
       return Command(motion.servo(view, goal, gain=0.2), CLOSE, noise=0.5)
   return reach(view, target)
 
 
-def _low(target: BlockView, height: float = GRIP_HEIGHT) -> float:
-  """The TCP's height so far above a block's centre, within the box, m."""
+def _tcp_z(target: BlockView, height: float = GRIP_HEIGHT) -> float:
+  """A height above the block's centre, within the set-point box, m."""
   return max(target.z + height, ws.SET_POINT_LOW[2])
 
 
@@ -109,7 +109,7 @@ def _is_centred(view: View, target: BlockView) -> bool:
 
 def _sweep(view: View, target: BlockView, side: float) -> Command:
   """Pushes a block along y with one open finger, whose face squares it."""
-  goal = (target.x, view.set_point[1] + 0.02 * side, _low(target))
+  goal = (target.x, view.set_point[1] + 0.02 * side, _tcp_z(target))
   return Command(motion.servo(view, goal, speed=0.75), OPEN, noise=0.6)
 
 
@@ -137,7 +137,7 @@ def _push_free(view: View, target: BlockView) -> Command:
   if abs(other.x) > 0.07:  # towards the middle, not up the wall
     side = -math.copysign(1.0, other.x)
   dx, dy, dz = across(view, target)
-  low = _low(target, 0.004)
+  low = _tcp_z(target, 0.004)
   behind = -side * (target.half + 0.022)
   if dz < 0.022 and abs(dy) < 0.012 and side * dx < -0.018:
     goal = (view.set_point[0] + side * 0.03, target.y, low)

@@ -4,7 +4,6 @@ import json
 import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 from concurrent import futures
 
@@ -17,11 +16,6 @@ from lfgp_dmc.pictures import video
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
-_WITHOUT_DISPLAY = {
-  k: v
-  for k, v in os.environ.items()
-  if k not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
-}
 
 # Script, arguments, what the message says.
 _BAD = (
@@ -48,23 +42,11 @@ _BAD = (
 )
 
 
-def _call(line: str, folder: str) -> subprocess.CompletedProcess:
-  script, *arguments = line.split()
-  return subprocess.run(
-    [sys.executable, str(_ROOT / "launch" / script), *arguments],
-    cwd=folder,
-    env=_WITHOUT_DISPLAY,
-    capture_output=True,
-    text=True,
-    check=False,
-  )
-
-
 class BadInputTest(absltest.TestCase):
   def test_is_told_in_a_line_and_leaves_nothing(self):
     folder = self.create_tempdir().full_path
     with futures.ThreadPoolExecutor(command.cores()) as pool:
-      calls = pool.map(lambda case: _call(case[0], folder), _BAD)
+      calls = pool.map(lambda case: fixtures.call(case[0], folder), _BAD)
       for (line, message), done in zip(_BAD, calls, strict=True):
         with self.subTest(line):
           self.assertEqual(done.returncode, 1, done.stderr)
@@ -78,7 +60,7 @@ class DemoTest(absltest.TestCase):
     folder = pathlib.Path(self.create_tempdir().full_path)
     flagfile = _ROOT / "launch" / "flags" / "quickstart.flags"
     stored = _ROOT / "results" / "policies" / "stack"
-    done = _call(
+    done = fixtures.call(
       f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
       f"--stored={stored} "
       "--config.collect_pairs=40 --config.env_steps=360 "
@@ -126,7 +108,7 @@ class BlockRunTest(absltest.TestCase):
     training.train(config, cls.path, progress_bar=False)
 
   def _call(self, line: str) -> subprocess.CompletedProcess:
-    return _call(line, str(self.folder))
+    return fixtures.call(line, self.folder)
 
   def test_a_bare_resume_takes_the_runs_own_config(self):
     done = self._call("train.py --run=runs/tiny --resume")
@@ -217,12 +199,7 @@ class BlockRunTest(absltest.TestCase):
     names = [_names(done) for done in calls]
     self.assertEqual(
       names[0],
-      [
-        "control_steps_per_s",
-        "mj_step_per_s",
-        "mj_step_fraction",
-        "reset_ms",
-      ],
+      ["control_steps_per_s", "mj_step_per_s", "mj_step_fraction", "reset_ms"],
     )
     self.assertContainsSubset(
       ["steps", "nan", "warnings", "blocks_out", "max_block_speed"], names[1]

@@ -2,8 +2,11 @@
 
 import contextlib
 import dataclasses
+import os
 import pathlib
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from unittest import mock
 
@@ -12,10 +15,26 @@ import numpy as np
 from lfgp_dmc import toy
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.data import csv_files, demonstrations
-from lfgp_dmc.launch import configs
+from lfgp_dmc.launch import configs, training
 from lfgp_dmc.runs import run
+from tests import fixtures
 
 POINT = "lfgp_dmc.toy:PointEnvironment"
+_LAUNCH = pathlib.Path(configs.__file__).resolve().parents[1]
+_DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
+
+
+def call(line: str, folder: os.PathLike | str) -> subprocess.CompletedProcess:
+  """Runs a command, such as `plot.py --runs=a`, without a display."""
+  script, *arguments = line.split()
+  return subprocess.run(
+    [sys.executable, _LAUNCH / script, *arguments],
+    cwd=folder,
+    env={k: v for k, v in os.environ.items() if k not in _DISPLAYS},
+    capture_output=True,
+    text=True,
+    check=False,
+  )
 
 
 def write_dataset(
@@ -119,3 +138,34 @@ def stopped_after(checkpoints: int) -> Iterator[None]:
 
   with mock.patch.object(run.Run, "_checkpoint", checkpoint_and_stop):
     yield
+
+
+class RunTest(fixtures.FolderTest):
+  """Trains tiny runs of the toy environment in a folder of their own."""
+
+  def setUp(self):
+    super().setUp()
+    self.dataset = write_dataset(self.folder / "data")
+
+  def config(self, **changes) -> configs.RunConfig:
+    return small_config(self.dataset, **changes)
+
+  def train(self, config, name="a", resume=False):
+    """The run's folder, and its progress."""
+    path = self.folder / "runs" / name
+    return path, training.train(config, path, resume, progress_bar=False)
+
+  def check_resume(self, config, checkpoints=1):
+    """A run that is stopped and resumed equals one that never was."""
+    whole, progress = self.train(config, "whole")
+    with stopped_after(checkpoints):
+      path, stopped = self.train(config, "stopped")
+    self.assertFalse(stopped.is_complete)
+    # What a kill after a later row would leave, too.
+    with open(path / "metrics.csv", "a", encoding="utf-8") as file:
+      file.write("9999,9999")
+    _, resumed = self.train(config, "stopped", resume=True)
+    self.assertEqual(resumed.update, progress.update)
+    self.assertEqual(numbers(path), numbers(whole))
+    policies = [(p / "policy.safetensors").read_bytes() for p in (path, whole)]
+    self.assertEqual(*policies)

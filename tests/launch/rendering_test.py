@@ -17,29 +17,26 @@ from lfgp_dmc import graphics
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import clips, command, policies, view
 from lfgp_dmc.pictures.recorder import Look
+from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 _POLICY = str(_ROOT / "results" / "policies" / "stack")
-_SMALL = "--height=64 --width=96 --noshadows"
 
 
 class PolicyTest(absltest.TestCase):
   def test_loads_in_user_code(self):
     env = lfgp_dmc.load("stack", seed=0, time_limit=0.5)
     timestep = env.reset()
-    act = {
-      task: lfgp_dmc.load_policy(_POLICY, task)
-      for task in (None, "stack", "reach")
-    }
+    tasks = (None, "stack", "reach")
+    policies_of = [lfgp_dmc.load_policy(_POLICY, task) for task in tasks]
     while not timestep.last():
       observation = lfgp_dmc.flatten(timestep.observation)
-      action = {task: one(observation) for task, one in act.items()}
-      self.assertEqual(action["reach"].shape, (4,))
-      self.assertLessEqual(np.abs(action["reach"]).max(), 1)
-      np.testing.assert_array_equal(action[None], action["stack"])
-      self.assertFalse(np.array_equal(action["reach"], action["stack"]))
-      timestep = env.step(action["reach"])
-    env.close()
+      default, stack, reach = (act(observation) for act in policies_of)
+      self.assertEqual(reach.shape, (4,))
+      self.assertLessEqual(np.abs(reach).max(), 1)
+      np.testing.assert_array_equal(default, stack)
+      self.assertFalse(np.array_equal(reach, stack))
+      timestep = env.step(reach)
     with self.assertRaisesRegex(ValueError, "no intention 'insert'; it has"):
       lfgp_dmc.load_policy(_POLICY, "insert")
 
@@ -71,14 +68,8 @@ class RenderingTest(absltest.TestCase):
     self.folder = pathlib.Path(self.create_tempdir().full_path)
 
   def _render(self, line: str) -> subprocess.CompletedProcess:
-    script = _ROOT / "launch" / "render_policy.py"
-    return subprocess.run(
-      [sys.executable, script, *_SMALL.split(), *line.split()],
-      cwd=self.folder,
-      capture_output=True,
-      text=True,
-      check=False,
-    )
+    small = "--height=64 --width=96 --noshadows"
+    return fixtures.call(f"render_policy.py {small} {line}", self.folder)
 
   def _rendered(self, line: str, name: str):
     """The picture or frames, and what the sidecar says."""
@@ -130,7 +121,6 @@ class RenderingTest(absltest.TestCase):
 
   def test_frames_name_the_schedulers_choice(self):
     spec = policies.find(_POLICY, "")
-    stage = clips.Stage(spec, clips.SCHEDULED, Look(32, 32))
 
     def choices(step, timestep):
       return "reach" if step < 2 else "close_gripper"
@@ -142,7 +132,9 @@ class RenderingTest(absltest.TestCase):
       ) as label,
       mock.patch.object(clips, "scheduled", lambda *_: choices),
     ):
-      clip = stage.play(0, every=4, max_steps=2)
+      clip = clips.play(
+        spec, clips.SCHEDULED, 0, Look(32, 32, every=4), max_steps=2
+      )
     self.assertEqual(clip.labels, ["reach", "reach", "close_gripper"])
     first, *_, last = label.call_args_list
     self.assertEqual(first.args[1:], ("scheduler: reach", "step 0"))

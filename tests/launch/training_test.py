@@ -1,6 +1,5 @@
 """A run from its config to its files, continued, and refused."""
 
-import pathlib
 from unittest import mock
 
 import numpy as np
@@ -8,70 +7,50 @@ from absl.testing import absltest, parameterized
 
 import lfgp_dmc
 from lfgp_dmc.data import evaluation_csv
-from lfgp_dmc.launch import training
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import loop, run_folder
 from lfgp_dmc.runs.schedule import Progress
 from tests.launch import fixtures
 
 
-class TrainingTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-    self.dataset = fixtures.write_dataset(self.folder / "data")
-    self.run = self.folder / "runs" / "a"
-
-  def _config(self, **changes):
-    return fixtures.small_config(self.dataset, **changes)
-
-  def _train(self, config, path=None, resume=False):
-    return training.train(config, path or self.run, resume, False)
-
+class TrainingTest(fixtures.RunTest):
   def test_leaves_rows_checkpoints_and_a_policy(self):
-    progress = self._train(self._config(evaluate_first=True))
+    run, progress = self.train(self.config(evaluate_first=True))
     self.assertEqual(progress.env_step, 200)
-    self.assertLen(fixtures.rows(self.run / "metrics.csv"), 10)
-    rows = evaluation_csv.read_csv(self.run / "evaluation.csv")
+    self.assertLen(fixtures.rows(run / "metrics.csv"), 10)
+    rows = evaluation_csv.read_csv(run / "evaluation.csv")
     self.assertEqual({row.env_step for row in rows}, {0, 100, 200})
     self.assertEqual({row.task for row in rows}, {"right", "left"})
-    self.assertTrue((self.run / "checkpoints" / "000000200").is_dir())
-    act = lfgp_dmc.load_policy(self.run, "left")
+    self.assertTrue((run / "checkpoints" / "000000200").is_dir())
+    act = lfgp_dmc.load_policy(run, "left")
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
-    stored = run_folder.read_config(self.run)
+    stored = run_folder.read_config(run)
     self.assertEqual(stored["policy"]["env_step"], 200)
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
-    config = self._config()
-    self._train(config)
-    other = self.folder / "runs" / "b"
-    with fixtures.stopped_after(2):
-      progress = self._train(config, other)
-    self.assertLess(progress.env_step, 200)
-    progress = self._train(config, other, resume=True)
-    self.assertEqual(progress.env_step, 200)
-    self.assertEqual(fixtures.numbers(other), fixtures.numbers(self.run))
+    self.check_resume(self.config(), checkpoints=2)
 
   def test_a_finished_run_resumes_to_nothing(self):
-    self._train(self._config())
-    before = (self.run / "metrics.csv").read_bytes()
-    progress = self._train(self._config(), resume=True)
+    run, _ = self.train(self.config())
+    before = (run / "metrics.csv").read_bytes()
+    _, progress = self.train(self.config(), resume=True)
     self.assertEqual(progress.env_step, 200)
-    self.assertEqual((self.run / "metrics.csv").read_bytes(), before)
+    self.assertEqual((run / "metrics.csv").read_bytes(), before)
 
   def test_another_config_is_not_resumed(self):
-    self._train(self._config())
-    changed = self._config(**{"agent.scheduler.xi": 10, "seed": 4})
+    self.train(self.config())
+    changed = self.config(**{"agent.scheduler.xi": 10, "seed": 4})
     with self.assertRaisesRegex(
       UserError, r"seed \(0, now 4\); agent.scheduler.xi \(5, now 10\)"
     ):
-      self._train(changed, resume=True)
+      self.train(changed, resume=True)
 
   def test_an_existing_folder_is_refused(self):
-    self.run.mkdir(parents=True)
+    run = self.folder / "runs" / "a"
+    run.mkdir(parents=True)
     with self.assertRaisesRegex(UserError, "exists.*--resume"):
-      self._train(self._config())
-    self.assertEmpty(list(self.run.iterdir()))
+      self.train(self.config())
+    self.assertEmpty(list(run.iterdir()))
 
   @parameterized.parameters(
     ({"demonstrations": ""}, "demonstrations is not set"),
@@ -81,15 +60,12 @@ class TrainingTest(parameterized.TestCase):
     ({"device": "abacus"}, "config.device is 'abacus'"),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
     ({"main_task": "up"}, "up.hdf5: missing"),
-    (
-      {"agent.scheduler.kind": "weighted_random_handcrafted"},
-      "handcrafted",
-    ),
+    ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
   )
   def test_bad_input_leaves_no_folder(self, changes, message):
     with self.assertRaisesRegex(UserError, message):
-      self._train(self._config(**changes))
-    self.assertFalse(self.run.exists())
+      self.train(self.config(**changes))
+    self.assertFalse((self.folder / "runs" / "a").exists())
 
   def test_every_fault_of_a_dataset_is_told(self):
     (self.dataset / "right.hdf5").write_bytes(b"not HDF5")
@@ -97,12 +73,12 @@ class TrainingTest(parameterized.TestCase):
     with self.assertRaisesRegex(
       UserError, r"(?s)right.hdf5: not a readable.*left.hdf5: missing"
     ):
-      self._train(self._config())
+      self.train(self.config())
 
   def test_demonstrations_of_another_rate_are_refused(self):
-    folder = pathlib.Path(self.create_tempdir().full_path) / "lift"
+    folder = self.folder / "lift"
     fixtures.write_dataset(folder, ("lift",), 59, 4)
-    config = self._config(
+    config = self.config(
       demonstrations=str(folder),
       environment="",
       main_task="lift",
@@ -111,19 +87,19 @@ class TrainingTest(parameterized.TestCase):
     with self.assertRaisesRegex(
       UserError, r"config.control_hz is 5; .* another rate: lift \(20\)"
     ):
-      self._train(config)
+      self.train(config)
 
   def test_uses_the_first_pairs_alone(self):
     with mock.patch.object(loop, "train") as train:
       train.return_value = Progress()
-      self._train(self._config(pairs_per_task=20))
+      self.train(self.config(pairs_per_task=20))
     agent = train.call_args.args[1]
     self.assertEqual(agent._experts._sizes.tolist(), [20, 20])
 
   def test_a_smaller_replay_resumes_too(self):
-    config = self._config(replay_capacity=60, env_steps=120)
-    self._train(config)
-    self._train(config, resume=True)
+    config = self.config(replay_capacity=60, env_steps=120)
+    self.train(config)
+    self.train(config, resume=True)
 
 
 if __name__ == "__main__":

@@ -1,17 +1,16 @@
 """Runs that go on from other runs: SAC-X, transfers, stored policies."""
 
-import pathlib
 import shutil
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import absltest
 
 from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, configs, datasets, training
+from lfgp_dmc.launch import assemble, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
@@ -35,29 +34,22 @@ def _renamed(named):
 OTHER = "tests.launch.transfer_test:TwoWorlds"
 
 
-class _RunTest(parameterized.TestCase):
+class _RunTest(fixtures.RunTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-    self.dataset = fixtures.write_dataset(self.folder / "data")
     fixtures.write_dataset(self.folder / "other", ("right", "up"))
 
-  def _config(self, algorithm="lfgp", **changes):
+  def config(self, algorithm="lfgp", **changes):
     if algorithm == "sacx":
       own = {"algorithm": "sacx", "demonstrations": "", "random_steps": 0}
       changes = {**own, "agent.scheduler.kind": "uniform", **changes}
-    return fixtures.small_config(
-      self.dataset, **{"evaluate_every": 1000, "env_steps": 100, **changes}
-    )
-
-  def _train(self, config, name, resume=False):
-    path = self.folder / name
-    return path, training.train(config, path, resume, False)
+    options = {"evaluate_every": 1000, "env_steps": 100, **changes}
+    return super().config(**options)
 
 
 class SacxTest(_RunTest):
   def test_needs_no_demonstrations_and_keeps_all_rewards(self):
-    path, _ = self._train(self._config("sacx"), "a")
+    path, _ = self.train(self.config("sacx"), "a")
     stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("right", "left"))
     rows = np.arange(len(stored))
@@ -71,10 +63,10 @@ class SacxTest(_RunTest):
     self.assertNotEqual(last["reward/left"], "nan")
 
   def test_killed_and_resumed_it_keeps_the_rewards_and_the_numbers(self):
-    config = self._config("sacx", replay_capacity=60)
-    whole, _ = self._train(config, "whole")
+    config = self.config("sacx", replay_capacity=60)
+    whole, _ = self.train(config, "whole")
     with fixtures.stopped_after(1):
-      path, progress = self._train(config, "killed")
+      path, progress = self.train(config, "killed")
     self.assertLess(progress.env_step, 100)
     # As if killed later: rows beyond the checkpoint, which are to be forgotten.
     replay = Replay(
@@ -84,7 +76,7 @@ class SacxTest(_RunTest):
     replay.add_batch(replay.gather(rows), 100 + replay.gather_rewards(rows))
     replay.flush()
     del replay
-    self._train(config, "killed", resume=True)
+    self.train(config, "killed", resume=True)
     self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
     rewards = [
       stored.gather_rewards(np.arange(len(stored)))
@@ -95,7 +87,7 @@ class SacxTest(_RunTest):
   def test_a_task_without_a_conditional_table_is_told(self):
     with self.assertRaisesRegex(UserError, "no conditional table for.*'right'"):
       config = {"agent.scheduler.kind": "conditional_weighted"}
-      self._train(self._config("sacx", **config), "a")
+      self.train(self.config("sacx", **config), "a")
 
   def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
     config = configs.to_run_config(configs.make_config("sacx"))
@@ -107,7 +99,7 @@ class SacxTest(_RunTest):
 
 class TransferTest(_RunTest):
   def _to(self, source, algorithm="lfgp", **changes):
-    return self._config(
+    return self.config(
       algorithm,
       **{
         "environment": OTHER,
@@ -123,7 +115,7 @@ class TransferTest(_RunTest):
     )
 
   def test_starts_with_the_other_runs_networks_and_replay(self):
-    source, _ = self._train(self._config(), "source")
+    source, _ = self.train(self.config(), "source")
     policy = Policy.load(source)
     started = {}
     real = Run.train
@@ -134,7 +126,7 @@ class TransferTest(_RunTest):
       return real(run)
 
     with mock.patch.object(Run, "train", look):
-      path, _ = self._train(self._to(source), "new")
+      path, _ = self.train(self._to(source), "new")
     self.assertEqual(started["rows"], 100)
     for name, array in started["policy"].items():
       old = policy.arrays()[name]
@@ -148,15 +140,15 @@ class TransferTest(_RunTest):
 
   def test_rewards_of_a_new_task_come_from_the_old_replay(self):
     """SAC-X stored the reward of "left", which becomes a task only later."""
-    config = self._config("sacx", **{"env_steps": 60})
+    config = self.config("sacx", **{"env_steps": 60})
     with mock.patch.object(assemble, "tasks_of", lambda *_: ("right",)):
-      source, _ = self._train(config, "source")
+      source, _ = self.train(config, "source")
     self.assertEqual(run_folder.read_config(source)["policy"]["tasks"],
                      ["right"])  # fmt: skip
     target = self._to(
       source, "sacx", environment=fixtures.POINT, main_task="left"
     )
-    path, _ = self._train(target, "new")
+    path, _ = self.train(target, "new")
     stored = Replay.stored(path / "replay")
     self.assertEqual(stored.reward_tasks, ("left", "right"))
     rows = np.arange(len(stored))
@@ -167,28 +159,28 @@ class TransferTest(_RunTest):
                                atol=1e-5)  # fmt: skip
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
-    source, _ = self._train(self._config(), "source")
+    source, _ = self.train(self.config(), "source")
     config = self._to(source)
-    whole, _ = self._train(config, "whole")
+    whole, _ = self.train(config, "whole")
     with fixtures.stopped_after(1):
-      path, _ = self._train(config, "killed")
+      path, _ = self.train(config, "killed")
     source.rename(self.folder / "moved")  # it is not needed any more
-    self._train(config, "killed", resume=True)
+    self.train(config, "killed", resume=True)
     self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_killed_before_its_first_checkpoint_it_transfers_again(self):
-    source, _ = self._train(self._config(), "source")
+    source, _ = self.train(self.config(), "source")
     config = self._to(source)
-    whole, _ = self._train(config, "whole")
-    path, _ = self._train(config, "killed")
+    whole, _ = self.train(config, "whole")
+    path, _ = self.train(config, "killed")
     shutil.rmtree(path / "checkpoints")
-    self._train(config, "killed", resume=True)
+    self.train(config, "killed", resume=True)
     self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_what_cannot_be_transferred_from_leaves_no_folder(self):
-    lfgp, _ = self._train(self._config(), "lfgp")
-    small, _ = self._train(
-      self._config(**{"agent.networks.hidden_size": 8}), "small"
+    lfgp, _ = self.train(self.config(), "lfgp")
+    small, _ = self.train(
+      self.config(**{"agent.networks.hidden_size": 8}), "small"
     )
     bare = self.folder / "bare"
     Policy.load(lfgp).save(bare)
@@ -199,33 +191,33 @@ class TransferTest(_RunTest):
       (self._to(lfgp, "sacx"), "keeps no rewards of up, right"),
     ):
       with self.assertRaisesRegex(UserError, message):
-        self._train(config, "new")
-      self.assertFalse((self.folder / "new").exists())
+        self.train(config, "new")
+      self.assertFalse((self.folder / "runs" / "new").exists())
 
 
 class InitFromTest(_RunTest):
   def test_starts_from_a_policy_folder(self):
-    source, _ = self._train(self._config(), "source")
+    source, _ = self.train(self.config(), "source")
     bare = self.folder / "bare"
     Policy.load(source).save(bare)
-    config = self._config(
+    config = self.config(
       init_from=str(bare), **{"agent.networks.actor_trunk": "own"}
     )
     with mock.patch.object(Run, "train") as train:
       train.return_value = None
-      self._train(config, "a")
-    self._train(config, "a", resume=True)  # was killed at once: starts again
-    wrong = self._config(
+      self.train(config, "a")
+    self.train(config, "a", resume=True)  # was killed at once: starts again
+    wrong = self.config(
       init_from=str(self.folder / "data"),
       **{"agent.networks.actor_trunk": "own"},
     )
     with self.assertRaisesRegex(UserError, "no policy in .*data"):
-      self._train(wrong, "b")
+      self.train(wrong, "b")
 
 
 class ExamplesTest(_RunTest):
   def test_learns_from_rows_of_success(self):
-    config = self._config(
+    config = self.config(
       **{
         "agent.reward.kind": "examples",
         "agent.scheduler.kind": "weighted_random",
@@ -233,40 +225,10 @@ class ExamplesTest(_RunTest):
         "agent.reward.scale": 0.1,
       }
     )
-    path, _ = self._train(config, "a")
+    path, _ = self.train(config, "a")
     (*_, last) = fixtures.rows(path / "metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
-    self._train(config, "a", resume=True)
-
-  def test_mirror_images_double_what_was_shown(self):
-    dataset = fixtures.write_dataset(
-      self.folder / "shown", ("stack", "move_object"), 59, 4, pairs=20
-    )
-    for mirror, pairs in ((False, 15), (True, 30)):
-      config = fixtures.small_config(
-        dataset,
-        environment="",
-        main_task="stack",
-        mirror_demonstrations=mirror,
-        pairs_per_task=15,
-      )
-      shown = datasets.load(config, ["stack", "move_object"], (59, 4))
-      self.assertLen(shown["stack"], pairs)
-      self.assertLen(shown["move_object"], 15)
-
-  def test_published_examples_are_read_like_a_dataset(self):
-    data = pathlib.Path(__file__).parents[1] / "data"
-    folder = self.folder / "examples"
-    folder.mkdir()
-    with np.load(data / "published_lift.npz", allow_pickle=False) as part:
-      rows = {name: part[name][:50] for name in part.files}
-    rows["observation"] = rows["next_observation"]
-    np.savez(folder / "lift.npz", **rows)
-    config = self._config(**{"demonstrations": str(folder)})
-    shown = datasets.load(config, ["lift"], (59, 4))
-    self.assertLen(shown["lift"], 50)
-    with self.assertRaisesRegex(UserError, "stack.npz: missing"):
-      datasets.load(config, ["lift", "stack"], (59, 4))
+    self.train(config, "a", resume=True)
 
 
 if __name__ == "__main__":

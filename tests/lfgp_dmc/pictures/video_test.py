@@ -8,7 +8,7 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.pictures import film_strips, video
-from lfgp_dmc.pictures.recorder import Clip
+from lfgp_dmc.pictures.recorder import Clip, Look
 
 
 def _frames(count=8, height=47, width=63):
@@ -70,15 +70,15 @@ class VideoTest(parameterized.TestCase):
 
 class FilmStripTest(absltest.TestCase):
   def test_shows_the_first_success_from_the_reset_on(self):
-    def play(seed, every=0, max_steps=40, until_success_of=None):
+    def play(seed, look, max_steps=40, until_success_of=None):
       success = {"lift": 12} if seed == 7 else {}
-      frames = list(range(2 * max_steps + 1)) if every else []
+      frames = list(range(2 * max_steps + 1)) if look.every else []
       return Clip(frames, [], success, max_steps, checks=2)
 
-    found = film_strips.row(play, "lift", range(5, 9), 4)
+    found = film_strips.row(play, "lift", range(5, 9), Look(), 4)
     self.assertEqual(found, ([0, 8, 16, 24], 7, 12))
     with self.assertRaisesRegex(ValueError, "no success of lift in 2 episodes"):
-      film_strips.row(play, "lift", range(2), 4)
+      film_strips.row(play, "lift", range(2), Look(), 4)
 
 
 if __name__ == "__main__":

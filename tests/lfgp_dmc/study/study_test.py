@@ -94,11 +94,9 @@ class StudyTest(parameterized.TestCase):
     np.testing.assert_allclose(curve.scores[:, 0], [[0.5], [0.25]])
 
   @parameterized.parameters(
-    ("lfgp", {"demonstrations": "data/stack_reset"}),
+    ("lfgp", {"demonstrations": "data/stack_reset", "transfer_from": ""}),
     ("lfgp_play", {"demonstrations": "data/stack_play"}),
     ("lfgp_transfer", {"transfer_from": "runs/a"}),
-    ("lfgp_transfer", {"agent": {"transfer_run": "runs/a"}}),
-    ("lfgp", {"agent": {"transfer_run": "", "transfer_updates": 1000}}),
   )
   def test_the_method_follows_from_the_config(self, method, config):
     found = run_results.method_of({"algorithm": "lfgp", **config})

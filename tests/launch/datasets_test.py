@@ -1,0 +1,46 @@
+"""The demonstrations of a run, from several kinds of folders."""
+
+import pathlib
+
+import numpy as np
+from absl.testing import absltest
+
+from lfgp_dmc.launch import datasets
+from lfgp_dmc.launch.command import UserError
+from tests.launch import fixtures
+
+
+class DatasetsTest(fixtures.RunTest):
+  def test_mirror_images_double_what_was_shown(self):
+    dataset = fixtures.write_dataset(
+      self.folder / "shown", ("stack", "move_object"), 59, 4, pairs=20
+    )
+    for mirror, pairs in ((False, 15), (True, 30)):
+      config = fixtures.small_config(
+        dataset,
+        environment="",
+        main_task="stack",
+        mirror_demonstrations=mirror,
+        pairs_per_task=15,
+      )
+      shown = datasets.load(config, ["stack", "move_object"], (59, 4))
+      self.assertLen(shown["stack"], pairs)
+      self.assertLen(shown["move_object"], 15)
+
+  def test_published_examples_are_read_like_a_dataset(self):
+    data = pathlib.Path(__file__).parents[1] / "data"
+    folder = self.folder / "examples"
+    folder.mkdir()
+    with np.load(data / "published_lift.npz", allow_pickle=False) as part:
+      rows = {name: part[name][:50] for name in part.files}
+    rows["observation"] = rows["next_observation"]
+    np.savez(folder / "lift.npz", **rows)
+    config = self.config(demonstrations=str(folder))
+    shown = datasets.load(config, ["lift"], (59, 4))
+    self.assertLen(shown["lift"], 50)
+    with self.assertRaisesRegex(UserError, "stack.npz: missing"):
+      datasets.load(config, ["lift", "stack"], (59, 4))
+
+
+if __name__ == "__main__":
+  absltest.main()
