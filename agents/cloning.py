@@ -36,15 +36,7 @@ class IntentionCloner:
     loss: str,
     dtype: torch.dtype,
   ):
-    """Makes the optimiser.
-
-    Args:
-      network: what to train; its trunk is trained if it owns it.
-      learning_rate: step size of Adam.
-      config: of the optimiser.
-      loss: squared_error or likelihood.
-      dtype: of products.
-    """
+    """Makes the optimiser of heads and, if the network owns it, trunk."""
     self._network = network
     self._parameters = network.trained_parameters()
     self._optimiser = make_optimiser(

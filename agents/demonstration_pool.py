@@ -18,17 +18,11 @@ def make_standardiser(
   observation_size: int,
   action_size: int,
 ) -> Standardiser:
-  """Checks the demonstrations, and fits the standardiser if configured.
-
-  Args:
-    config: of the inputs.
-    demonstrations: by task; None: none are used.
-    tasks: the K tasks.
-    observation_size: O of the environment.
-    action_size: A of the environment.
+  """Checks the demonstrations, if any are used, and fits to them if configured.
 
   Raises:
-    ValueError: a task has no demonstrations, or they are of other sizes.
+    ValueError: a task has no demonstrations, or they are of other sizes than
+      the environment's O and A.
   """
   standardiser = Standardiser(observation_size, config.tanh_feature_scale)
   if demonstrations is None:
@@ -71,11 +65,6 @@ class ExpertPool:
     standardiser: Standardiser,
   ):
     """Copies the demonstrations to the standardiser's device.
-
-    Args:
-      demonstrations: by task.
-      tasks: the K tasks, in the order of every K axis; main first.
-      standardiser: raw observations -> network inputs.
 
     Raises:
       ValueError: a task has no demonstrations.

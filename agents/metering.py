@@ -17,14 +17,7 @@ class Meter:
     by_task: Sequence[str],
     device: torch.device | str = "cpu",
   ):
-    """Starts empty.
-
-    Args:
-      tasks: names of the K tasks.
-      scalars: names of metrics with one value.
-      by_task: names of metrics with K values, reported as `name/<task>`.
-      device: where the metrics come from.
-    """
+    """Starts empty; metrics `by_task` are reported as `name/<task>`."""
     self._tasks = tuple(tasks)
     size = len(self._tasks)
     self._sums = {name: torch.zeros((), device=device) for name in scalars}

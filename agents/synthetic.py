@@ -17,18 +17,9 @@ def demonstrations(
   seed: int = 0,
   attempt: int = 50,
 ) -> dict[str, Demonstrations]:
-  """Draws a cloud for each task, with an action that depends on the state.
+  """Draws `pairs` of each task: a cloud, with actions that depend on the state.
 
-  Args:
-    tasks: names of the K tasks.
-    pairs: N for each task.
-    observation_size: O.
-    action_size: A.
-    seed: of all numbers.
-    attempt: pairs an episode; the last is marked as its success.
-
-  Returns:
-    Task -> demonstrations.
+  Every `attempt`-th pair is marked as a success.
   """
   generator = np.random.default_rng(seed)
   matrix = generator.standard_normal((observation_size, action_size))

@@ -18,14 +18,7 @@ class ValueBounds:
   def __init__(
     self, tasks: int, window: int, discount: float, device: torch.device
   ):
-    """Starts without a median.
-
-    Args:
-      tasks: K.
-      window: updates that the medians run over.
-      discount: gamma.
-      device: where to compute.
-    """
+    """Starts without a median; `window`: the updates that it runs over."""
     # The latest last; NaN for updates that have not been made yet.
     self._rows = torch.full((window, 2, tasks), torch.nan, device=device)
     self._horizon = 1.0 / max(1.0 - discount, 1e-8)

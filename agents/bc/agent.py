@@ -42,16 +42,7 @@ class BcAgent:
     shuffling: np.random.Generator,
     dtype: torch.dtype,
   ):
-    """Puts the parts together; see `build`.
-
-    Args:
-      config: settings.
-      tasks: names of the K tasks, the main task first.
-      network: what to train.
-      pairs: of all tasks, split.
-      shuffling: source of each epoch's order.
-      dtype: of products in training.
-    """
+    """Puts the parts together; see `build`."""
     self.tasks = tuple(tasks)
     self._config = config
     self._network = network
@@ -174,22 +165,7 @@ def build(
   bfloat16: bool = False,
   **unused: object,
 ) -> BcAgent:
-  """Builds a BC agent.
-
-  Args:
-    config: settings.
-    tasks: names of the K tasks, the main task first.
-    demonstrations: by task.
-    replay: not used; all builders take the same arguments.
-    seed: every random number of the agent follows from it.
-    device: where to compute.
-    observation_size: O.
-    action_size: A.
-    bfloat16: products in bfloat16; parameters stay float32.
-    unused: as `replay`.
-
-  Returns:
-    The agent; same seed and calls, same numbers.
+  """Builds a BC agent; arguments as of `agents.lfgp.build`, the replay unused.
 
   Raises:
     ValueError: demonstrations are missing, too few, or of other sizes.

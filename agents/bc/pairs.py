@@ -28,13 +28,6 @@ class SplitPairs:
   ):
     """Copies the pairs to the standardiser's device and splits them.
 
-    Args:
-      demonstrations: by task.
-      tasks: the K tasks, in the order of every K axis.
-      standardiser: raw observations -> network inputs, on the device.
-      validation_share: share of each task's pairs that is never trained on.
-      generator: source of the split.
-
     Raises:
       ValueError: a task has fewer than two pairs.
     """

@@ -38,19 +38,7 @@ class LfgpAgent:
     xi: int,
     discount: float,
   ):
-    """Puts the parts together; see `builder.build`.
-
-    Args:
-      tasks: names of the K tasks, the main task first.
-      learner: networks and updates.
-      batches: what updates are made on.
-      scheduler: chooses intentions.
-      pretraining: what comes before the first step.
-      experts: all tasks' demonstrations; None if none are used.
-      seed: of acting.
-      xi: steps a choice.
-      discount: gamma, of the scheduler's returns.
-    """
+    """Puts the parts together; see `builder.build`."""
     self.tasks = tuple(tasks)
     self.learner = learner
     self.batches = batches

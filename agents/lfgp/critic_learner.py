@@ -30,16 +30,7 @@ class CriticLearner:
     dtype: torch.dtype,
     bounds: type[ValueBounds] = ValueBounds,
   ):
-    """Makes the optimiser.
-
-    Args:
-      config: settings.
-      optimiser: likewise.
-      networks: critics, what to train; their targets and the intentions.
-      generator: on the networks' device, source of all noise.
-      dtype: of products.
-      bounds: what bounds values, for the value penalty.
-    """
+    """Makes the optimiser; `bounds` are the value penalty's."""
     parameters = list(networks.critics.parameters())
     self.optimiser = make_optimiser(
       parameters, config.learning_rate, optimiser.weight_decay

@@ -31,15 +31,7 @@ class DiscriminatorRewards(RewardSource):
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Makes the optimisers, by the names of the networks.
-
-    Args:
-      config: settings.
-      weight_decay: of the optimisers.
-      networks: the discriminators, what to train.
-      generator: on the networks' device, source of all noise.
-      dtype: of products.
-    """
+    """Makes the optimisers, by the names of the networks."""
     super().__init__()
     names = ("main_discriminator", "discriminator")
     made = {name: getattr(networks, name) for name in names}

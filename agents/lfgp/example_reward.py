@@ -49,16 +49,7 @@ class ExampleRewards(RewardSource):
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Keeps settings and networks.
-
-    Args:
-      config: shares and scale.
-      batch_size: B, examples included.
-      intentions: an example's action is its task's intention's.
-      tasks: K.
-      generator: on the networks' device, source of all noise.
-      dtype: of products.
-    """
+    """Keeps settings and networks; `batch_size` counts examples in."""
     super().__init__()
     self._scale = config.scale
     self._policy_rows = batch_size - example_rows(config, batch_size)

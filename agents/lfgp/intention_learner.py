@@ -28,16 +28,7 @@ class IntentionLearner:
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Makes the optimisers.
-
-    Args:
-      config: settings.
-      optimiser: likewise.
-      networks: intentions and temperatures, what to train; and the critics.
-      prior: regularises the loss, if there is one.
-      generator: on the networks' device, source of all noise.
-      dtype: of products.
-    """
+    """Makes the optimisers; the prior regularises the loss, if there is one."""
     self.target_entropy = config.target_entropy
     self._max_gradient_norm = optimiser.max_gradient_norm
     self._networks = networks

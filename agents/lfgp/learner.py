@@ -35,16 +35,7 @@ class LfgpLearner:
   ):
     """Puts the parts together; see `builder.make_learner`.
 
-    Args:
-      networks: what to train.
-      reward: where rewards come from.
-      critics: the critics' part of an update.
-      intentions: the intentions' part.
-      prior: what they stay near, if there is one.
-      generator: on the networks' device, source of all noise.
-      warmup_updates: first updates, without the intentions.
-      recorder: records updates, which are then replayed; None: each update is
-        computed step by step.
+    With a recorder, updates are recorded, then replayed.
     """
     self.networks = networks
     self.reward = reward

@@ -23,14 +23,7 @@ class Pretraining:
     batch_size: int,
     dtype: torch.dtype,
   ):
-    """Keeps the settings.
-
-    Args:
-      config: for how long, and by which loss.
-      optimiser: its settings.
-      batch_size: pairs a task.
-      dtype: of products.
-    """
+    """Keeps the settings; `batch_size` counts pairs a task."""
     self._config = config
     self._optimiser = optimiser
     self._batch_size = batch_size

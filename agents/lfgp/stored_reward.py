@@ -13,12 +13,7 @@ class StoredRewards(RewardSource):
   """Labels rows with their stored rewards."""
 
   def __init__(self, config: StoredReward, main_column: int):
-    """Keeps the settings.
-
-    Args:
-      config: clip and scale.
-      main_column: the main task's place among the replay's `reward_tasks`.
-    """
+    """`main_column`: the main task's place among the stored rewards."""
     super().__init__()
     self._config, self._main_column = config, main_column
 

@@ -24,11 +24,7 @@ def carry_networks(
 ) -> None:
   """Carries all networks over; the targets become copies of the critics.
 
-  Args:
-    networks: where to.
-    source: `LfgpLearner.state_dict()["networks"]` of the other learner.
-    tasks: ours.
-    source_tasks: its.
+  `source` is `LfgpLearner.state_dict()["networks"]` of the other learner.
 
   Raises:
     ValueError: its networks have other sizes or layouts.

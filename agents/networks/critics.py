@@ -24,17 +24,10 @@ class TwinCriticHeads(nn.Module):
     layer_norm: bool = False,
     hidden_layers: int = 1,
   ):
-    """Draws all heads.
+    """Draws all heads; `features` is the trunk's width, layers are 1 or 2.
 
-    Args:
-      tasks: K.
-      features: outputs of the trunk.
-      hidden: H, units of a hidden layer.
-      actions: A.
-      generator: source of the initial numbers.
-      layer_norm: normalise the last hidden layer before its ReLU, with a gain
-        and a bias for each head (not in the paper).
-      hidden_layers: 1 or 2.
+    Layer norm (not in the paper), before the last ReLU, has a gain and a bias
+    for each head.
     """
     super().__init__()
     self.tasks = tasks
@@ -105,12 +98,7 @@ class CriticNetwork(nn.Module):
   """Trunk and twin heads: the target network is a copy of the whole."""
 
   def __init__(self, trunk: nn.Module, heads: TwinCriticHeads):
-    """Puts the parts together.
-
-    Args:
-      trunk: inputs [B, O] -> features; see `layouts.py`.
-      heads: features and actions -> values.
-    """
+    """Puts the parts together; see `layouts.py`."""
     super().__init__()
     self.trunk = trunk
     self.heads = heads

@@ -24,16 +24,7 @@ class IntentionHeads(nn.Module):
     generator: torch.Generator,
     hidden_layers: int = 1,
   ):
-    """Draws all heads.
-
-    Args:
-      tasks: K.
-      features: outputs of the trunk.
-      hidden: H, units of a hidden layer.
-      actions: A.
-      generator: source of the initial numbers.
-      hidden_layers: 1 or 2.
-    """
+    """Draws all heads; `features` is the trunk's width, layers are 1 or 2."""
     super().__init__()
     self.hidden = StackedLinear(tasks, features, hidden, generator)
     self.second = None

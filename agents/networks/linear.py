@@ -10,16 +10,7 @@ from torch.nn import functional
 def initialise_(
   parameter: torch.Tensor, fan_in: int, generator: torch.Generator
 ) -> torch.Tensor:
-  """Fills weights or biases as `torch.nn.Linear` does, in place.
-
-  Args:
-    parameter: tensor of any shape.
-    fan_in: inputs of one layer, 1 or more.
-    generator: source of the numbers.
-
-  Returns:
-    `parameter`, uniform within +-1 / sqrt(fan_in).
-  """
+  """Fills weights or biases within +-1 / sqrt(fan_in), in place."""
   bound = 1.0 / math.sqrt(fan_in)
   with torch.no_grad():
     return parameter.uniform_(-bound, bound, generator=generator)
@@ -53,14 +44,7 @@ class StackedLinear(nn.Module):
   def __init__(
     self, groups: int, inputs: int, outputs: int, generator: torch.Generator
   ):
-    """Draws each layer as `torch.nn.Linear` with its own fan-in.
-
-    Args:
-      groups: G, the number of layers.
-      inputs: fan-in of each layer.
-      outputs: outputs of each layer.
-      generator: source of the initial numbers.
-    """
+    """Draws each of G layers as `torch.nn.Linear` with its own fan-in."""
     super().__init__()
     self.weight = nn.Parameter(torch.empty(groups, inputs, outputs))
     self.bias = nn.Parameter(torch.empty(groups, 1, outputs))

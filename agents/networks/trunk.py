@@ -59,13 +59,7 @@ class Trunk(nn.Module):
   """Two layers with ReLU, O -> H -> H, shared by all tasks."""
 
   def __init__(self, inputs: int, hidden: int, generator: torch.Generator):
-    """Draws both layers.
-
-    Args:
-      inputs: O, floats of an observation.
-      hidden: H, units of each layer.
-      generator: source of the initial numbers.
-    """
+    """Draws both layers."""
     super().__init__()
     self.first = make_linear(inputs, hidden, generator)
     self.second = make_linear(hidden, hidden, generator)

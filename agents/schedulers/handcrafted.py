@@ -63,14 +63,7 @@ class WeightedRandomHandcrafted(Scheduler):
     probability: float,
     generator: np.random.Generator,
   ):
-    """Keeps the sequences.
-
-    Args:
-      weights: [K], for episodes without a sequence.
-      sequences: indices of tasks; one shorter than an episode starts over.
-      probability: of a sequence, 0..1; they are equally likely.
-      generator: source of the choices.
-    """
+    """Keeps weights [K] and sequences, which start over in longer episodes."""
     super().__init__(generator)
     self._random = WeightedRandom(weights, generator)
     self._sequences = [tuple(sequence) for sequence in sequences]

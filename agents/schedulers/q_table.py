@@ -23,16 +23,7 @@ class QTable(Scheduler):
     decay: float = 0.9995,
     minimum: float = 0.1,
   ):
-    """Starts with an empty table: every value 0.
-
-    Args:
-      tasks: K.
-      generator: source of the choices.
-      phi: weight of a new return in the moving average, 0..1.
-      temperature: first temperature, in units of the return.
-      decay: factor on the temperature at every choice.
-      minimum: lowest temperature.
-    """
+    """Starts with an empty table; see `config.QTableConfig`."""
     super().__init__(generator)
     self._tasks = tasks
     self._phi = phi
