@@ -83,11 +83,7 @@ def make_replay(
 def make_agent(
   config: RunConfig, parts: Parts, replay: Replay | None
 ) -> ActingAgent | SupervisedAgent:
-  """The config's agent.
-
-  Raises:
-    ValueError: the parts do not fit it.
-  """
+  """The config's agent; raises ValueError if the parts do not fit it."""
   return ALGORITHMS[config.algorithm].build(
     config.agent,
     parts.tasks,
@@ -104,11 +100,7 @@ def make_agent(
 def make_run(
   config: RunConfig, parts: Parts, folder: RunFolder, progress_bar: bool
 ) -> Run:
-  """The run in its folder.
-
-  Raises:
-    ValueError: the parts do not fit the agent, or the replay is damaged.
-  """
+  """The run; raises ValueError if parts do not fit or files are damaged."""
   is_supervised = ALGORITHMS[config.algorithm].is_supervised
   replay = None if is_supervised else make_replay(config, parts, folder.replay)
   evaluate = functools.partial(

@@ -17,13 +17,7 @@ def train(
   resume: bool = False,
   progress_bar: bool = True,
 ) -> Progress:
-  """Trains, or goes on training, in a run's folder.
-
-  Args:
-    config: the resolved config.
-    path: the run's folder; it exists exactly if `resume`.
-    resume: whether to continue from its last good checkpoint.
-    progress_bar: whether to show one.
+  """Trains in a run's folder: a new one, or on from its last good checkpoint.
 
   Returns:
     How far it came; not complete if it was stopped.

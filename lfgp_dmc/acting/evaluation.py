@@ -36,10 +36,10 @@ def evaluate(
       `reward/<task>` if it can; see `environments.reseeded`.
     make_actor: builds the actor. With several workers both must be picklable.
     tasks: the intentions to evaluate.
-    episodes: episodes a task.
-    seed: the evaluation's own seed.
+    episodes: of each task.
+    seed: of resets and actors.
     workers: processes; 1 plays in this one.
-    progress: whether to show a progress bar.
+    progress: whether to show a bar.
     env_step: goes into the rows.
 
   Returns:

@@ -1,6 +1,7 @@
 """The CSV files of a run: read, append, and cut back to a checkpoint."""
 
 import csv
+import os
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -50,10 +51,11 @@ def append(
   if not path.exists() or not path.stat().st_size:
     write(path, columns, rows)
     return
-  found, _ = read(path)
-  if found != list(columns):
-    raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
-  with open(path, "a", newline="", encoding="utf-8") as file:
+  with open(path, "r+", newline="", encoding="utf-8") as file:
+    found = next(csv.reader(file))
+    if found != list(columns):
+      raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
+    file.seek(0, os.SEEK_END)
     csv.DictWriter(file, columns, lineterminator="\n").writerows(rows)
 
 

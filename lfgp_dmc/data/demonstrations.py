@@ -77,7 +77,7 @@ def write(
   """Writes one task's file: checked first, then whole or not at all.
 
   Args:
-    path: `<dataset>/<task>.hdf5`; its folder exists, the file does not.
+    path: `<dataset>/<task>.hdf5`, in a folder that exists.
     demonstrations: what to write.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed`,
       `control_hz`; None takes the demonstrations' own. `schema_version` is
@@ -116,9 +116,9 @@ def read(
 
   Args:
     path: the file.
-    task: the task it must be of; None accepts any.
-    observation_size: the width O it must have; None accepts any.
-    action_size: the width A it must have; None accepts any.
+    task: expected, like the widths O and A; None accepts any.
+    observation_size: O.
+    action_size: A.
 
   Raises:
     DatasetError: it is missing, damaged or breaks the contract; the message
@@ -151,8 +151,8 @@ def read_folder(
   Args:
     folder: the dataset folder.
     tasks: the tasks whose files are needed.
-    observation_size: width O of the environment; None accepts any.
-    action_size: width A of the environment; None accepts any.
+    observation_size: O; None accepts any.
+    action_size: A; None accepts any.
 
   Returns:
     Task -> its demonstrations, in the order of `tasks`.

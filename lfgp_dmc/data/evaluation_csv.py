@@ -65,21 +65,13 @@ def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
   return rates
 
 
-def mean_returns(rows: Sequence[EvaluationRow]) -> dict[str, float]:
-  """Task -> mean undiscounted return of its episodes."""
-  return {
-    task: float(np.mean([r.episode_return for r in rows if r.task == task]))
-    for task in dict.fromkeys(row.task for row in rows)
-  }
-
-
 def success_table(rows: Sequence[EvaluationRow]) -> str:
   """A plain-text table: success, episodes, mean steps and return per task.
 
   Args:
     rows: of one evaluation; pass those of one `env_step`.
   """
-  rates, returns = success_rates(rows), mean_returns(rows)
+  rates = success_rates(rows)
   width = max([16, *(len(task) + 2 for task in rates)])
   lines = [
     f"{'task':<{width}}{'success':>9}{'episodes':>10}{'mean steps':>12}"
@@ -92,7 +84,7 @@ def success_table(rows: Sequence[EvaluationRow]) -> str:
     mean_steps = f"{np.mean(steps):.1f}" if steps else "-"
     lines.append(
       f"{task:<{width}}{success:>9}{len(own):>10}{mean_steps:>12}"
-      f"{returns[task]:>13.2f}"
+      f"{np.mean([row.episode_return for row in own]):>13.2f}"
     )
   return "\n".join(lines)
 

@@ -14,12 +14,7 @@ class Ring:
   """The counts of a ring; the arrays are the subclass's."""
 
   def __init__(self, capacity: int, slack: int = 0):
-    """Starts empty.
-
-    Args:
-      capacity: most rows that can be sampled; older ones drop out.
-      slack: rows kept intact beyond the capacity.
-    """
+    """Starts empty."""
     if capacity < 1 or slack < 0:
       raise ValueError(f"capacity {capacity} and slack {slack} must be >= 1, 0")
     self.capacity = capacity

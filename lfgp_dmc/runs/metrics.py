@@ -1,6 +1,5 @@
 """The metrics of one run: `metrics.csv`, and TensorBoard events beside it."""
 
-import csv
 import pathlib
 import time
 from collections.abc import Mapping
@@ -42,18 +41,14 @@ class MetricsLog:
     """
     if csv_files.STEP_COLUMN not in row:
       raise ValueError(f"a metrics row needs {csv_files.STEP_COLUMN!r}")
-    if not self._columns:
-      self._columns = list(row)
-      csv_files.write(self._path, self._columns, [])
+    self._columns = self._columns or list(row)
     unknown = [name for name in row if name not in self._columns]
     if unknown:
       raise ValueError(
         f"{self._path}: columns {unknown} were not in the first row, which "
         "fixes them"
       )
-    with open(self._path, "a", newline="", encoding="utf-8") as file:
-      writer = csv.DictWriter(file, self._columns, lineterminator="\n")
-      writer.writerow(row)
+    csv_files.append(self._path, self._columns, [row])
     self.write_scalars(int(row[csv_files.STEP_COLUMN]), row)
 
   def write_scalars(self, env_step: int, values: Mapping[str, float]) -> None:

@@ -39,11 +39,11 @@ class Run:
     Args:
       folder: the run's, locked.
       agent: freshly built.
-      environment: where an acting agent acts.
-      replay: of an acting agent.
+      environment: of an acting agent, like `replay` and `seed`.
+      replay: opened from the folder.
       schedule: when things happen.
       evaluate: env_step -> episodes of the policy that the folder holds.
-      config: what `config.json` keeps, JSON-able.
+      config: the content of `config.json`.
       seed: of the episodes' starts.
     """
     self.agent, self.replay = agent, replay

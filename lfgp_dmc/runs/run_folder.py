@@ -20,21 +20,12 @@ ARRAYS_NAME = "policy.safetensors"
 POLICY_FIELD = "policy"
 
 
-class RunFolderError(ValueError):
-  """A run folder that cannot be used so; the message says why."""
-
-
 @dataclasses.dataclass(frozen=True)
 class RunFolder:
   """The places in one run's folder."""
 
   path: pathlib.Path
   _lock: Any = dataclasses.field(repr=False, compare=False, default=None)
-
-  @property
-  def config(self) -> pathlib.Path:
-    """The resolved config, JSON."""
-    return self.path / CONFIG_NAME
 
   @property
   def evaluation(self) -> pathlib.Path:
@@ -76,18 +67,18 @@ def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
     config: the resolved config, JSON-able.
 
   Raises:
-    RunFolderError: the folder exists.
+    ValueError: the folder exists.
     OSError: it cannot be made or written.
   """
   path = pathlib.Path(path)
   try:
     path.mkdir(parents=True)
   except FileExistsError:
-    raise RunFolderError(
+    raise ValueError(
       f"{path} exists; continue it with --resume, or choose another --run"
     ) from None
   run = RunFolder(path, _locked(path))
-  files.write_json(run.config, config)
+  files.write_json(path / CONFIG_NAME, config)
   return run
 
 
@@ -104,14 +95,14 @@ def resume(
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
-    RunFolderError: there is no such run, its config differs (the message names
+    ValueError: there is no such run, its config differs (the message names
       the fields), or another process is running it.
   """
   path = pathlib.Path(path)
   known = complete(settings(read_config(path)))
   fields = _differing_fields(known, settings(config))
   if fields:
-    raise RunFolderError(
+    raise ValueError(
       f"{path} was started with another config; --resume keeps it. Differing: "
       + "; ".join(fields)
     )
@@ -127,19 +118,19 @@ def read_config(path: files.Path) -> dict[str, Any]:
   """The config that a run or policy folder was written with.
 
   Raises:
-    RunFolderError: the folder or its config is missing or damaged.
+    ValueError: the folder or its config is missing or damaged.
   """
   path = pathlib.Path(path)
   if not path.is_dir():
-    raise RunFolderError(f"no run folder {path}")
+    raise ValueError(f"no run folder {path}")
   if not (path / CONFIG_NAME).is_file():
-    raise RunFolderError(f"{path} is not a run: it has no {CONFIG_NAME}")
+    raise ValueError(f"{path} is not a run: it has no {CONFIG_NAME}")
   try:
     config = files.read_json(path / CONFIG_NAME)
   except ValueError as error:
-    raise RunFolderError(str(error)) from None
+    raise ValueError(str(error)) from None
   if not isinstance(config, dict):
-    raise RunFolderError(f"{path / CONFIG_NAME} holds no config")
+    raise ValueError(f"{path / CONFIG_NAME} holds no config")
   return config
 
 
@@ -174,7 +165,7 @@ def _locked(path: pathlib.Path):
     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
   except BlockingIOError:
     file.close()
-    raise RunFolderError(
+    raise ValueError(
       f"another process is running {path}; wait for it or stop it"
     ) from None
   return file

@@ -87,9 +87,8 @@ class WhatMovesTest(parameterized.TestCase):
     learner = make_learner(**{"optimiser.max_gradient_norm": 1e-3})
     learner.update(_draw())
     for module in (learner.networks.critics, learner.networks.intentions.heads):
-      norms = [p.grad.norm() for p in module.parameters()]
-      total = torch.stack(norms).norm().item()
-      self.assertLessEqual(total, 1.001e-3)
+      norms = torch.stack([p.grad.norm() for p in module.parameters()])
+      self.assertLessEqual(norms.norm().item(), 1.001e-3)
 
 
 class UpdateTest(parameterized.TestCase):

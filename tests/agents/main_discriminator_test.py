@@ -16,10 +16,6 @@ def _agent(tasks=TASKS, **fields):
 
 
 class MainDiscriminatorTest(absltest.TestCase):
-  def setUp(self):
-    super().setUp()
-    torch.set_num_threads(1)
-
   def test_it_alone_has_its_own_floats_masked(self):
     learner = _agent(**{"reward.masked": "3:4"}).learner
     action = torch.zeros(OBS + 1, A)

@@ -87,9 +87,9 @@ class RunFolderTest(fixtures.FolderTest):
     config = {"seed": 0, "agent": {"xi": 45, "sizes": (256, 256)}}
     run = run_folder.create(self.folder / "runs" / "a", config)
     self.assertEqual(run_folder.read_config(run.path)["seed"], 0)
-    with self.assertRaisesRegex(run_folder.RunFolderError, "--resume"):
+    with self.assertRaisesRegex(ValueError, "--resume"):
       run_folder.create(run.path, config)
-    with self.assertRaisesRegex(run_folder.RunFolderError, "another process"):
+    with self.assertRaisesRegex(ValueError, "another process"):
       run_folder.resume(run.path, config)
     path = run.path
     del run
@@ -97,7 +97,7 @@ class RunFolderTest(fixtures.FolderTest):
 
   def test_a_changed_config_is_refused_by_field(self):
     run = run_folder.create(self.folder / "a", {"seed": 0, "agent": {"xi": 45}})
-    with self.assertRaises(run_folder.RunFolderError) as caught:
+    with self.assertRaises(ValueError) as caught:
       run_folder.resume(run.path, {"seed": 0, "agent": {"xi": 9, "new": True}})
     self.assertIn("agent.xi (45, now 9)", str(caught.exception))
     self.assertIn("agent.new (unset, now true)", str(caught.exception))
@@ -105,7 +105,8 @@ class RunFolderTest(fixtures.FolderTest):
 
   def test_what_the_run_added_is_no_change(self):
     run = run_folder.create(self.folder / "a", {"seed": 0})
-    files.write_json(run.config, {"seed": 0, "policy": {"tasks": ["reach"]}})
+    policy = {"tasks": ["reach"]}
+    files.write_json(run.path / "config.json", {"seed": 0, "policy": policy})
     path = run.path
     del run
     run_folder.resume(path, {"seed": 0})
@@ -114,9 +115,9 @@ class RunFolderTest(fixtures.FolderTest):
     for text, message in ((None, "has no"), ("{", "JSON"), ("[]", "no config")):
       if text is not None:
         (self.folder / "config.json").write_text(text)
-      with self.assertRaisesRegex(run_folder.RunFolderError, message):
+      with self.assertRaisesRegex(ValueError, message):
         run_folder.resume(self.folder, {})
-    with self.assertRaisesRegex(run_folder.RunFolderError, "no run folder"):
+    with self.assertRaisesRegex(ValueError, "no run folder"):
       run_folder.read_config(self.folder / "none")
 
   def test_default_path_is_new(self):

@@ -1,0 +1,71 @@
+"""Bad input to the commands: one clear line, and nothing left behind."""
+
+import os
+import pathlib
+from concurrent import futures
+
+from absl.testing import absltest
+
+from lfgp_dmc.launch import command
+from tests.launch import fixtures
+
+# Script, arguments, what the message says.
+_BAD = (
+  ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
+  ("train.py --flagfile=no.flags", "no.flags"),
+  ("train.py --config.seed=many", "flag --config.seed=many"),
+  ("train.py --resume", "--resume needs --run"),
+  ("train.py --resume --run=no/run", "no run folder no/run"),
+  ("evaluate.py stack", "unexpected argument 'stack'"),
+  ("evaluate.py", "give one of --run=FOLDER and --expert=scripted"),
+  ("evaluate.py --run=no/run", "no run folder no/run"),
+  ("evaluate.py --expert=scripted --tasks=juggle", "unknown juggle; valid:"),
+  ("evaluate.py --expert=mine", "--expert=mine is unknown; valid: scripted"),
+  ("evaluate.py --expert=scripted --episodes=0", "valid: 1 or more"),
+  ("render_policy.py --expert=scripted --task=juggle", "valid: stack, "),
+  ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
+  ("view.py --task=juggle", "--task=juggle is unknown; valid: stack"),
+  ("view.py --task=stack", "the viewer needs a display"),
+  ("plot.py", "--runs is missing"),
+  ("plot.py --runs=no/run", "no run folder no/run"),
+  ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
+  ("demo.py --stored=missing", "no run folder missing"),
+  ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
+)
+_BAD_COLLECTION = (
+  ("--output=new --task=juggle", "--task=juggle is unknown; valid: stack, "),
+  ("--output=new --tasks=insert", "--tasks=insert is unknown; valid: stack, "),
+  ("--output=new --collection=film", "valid: reset, play"),
+  ("--output=new --pairs_per_task=0", "--pairs_per_task=0; valid: 1 or more"),
+  ("--output=new --final_pairs=-1", "--final_pairs=-1; valid: 0 or more"),
+  ("--output=new --keep_longest_of=0", "--keep_longest_of=0; valid: 1 or more"),
+  ("--output=new --keep_longest_of=2 --collection=play", "valid: 1 with"),
+  ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),
+  ("--output=new --seed=-1", "--seed=-1; valid: 0 or more"),
+  ("--output=new --workers=-1", "--workers=-1; valid: 0 or more"),
+  ("--output=new --expert=no/run", "no run folder no/run"),
+  ("", "--output is not set"),
+  ("--output=old", "--output=old exists; valid: a new folder"),
+)
+
+
+class BadInputTest(absltest.TestCase):
+  def test_is_told_in_a_line_and_leaves_nothing(self):
+    folder = pathlib.Path(self.create_tempdir().full_path)
+    (folder / "old").mkdir()
+    cases = [*_BAD]
+    for line, message in _BAD_COLLECTION:
+      cases.append((f"collect_demonstrations.py {line}", message))
+    with futures.ThreadPoolExecutor(command.cores()) as pool:
+      calls = pool.map(lambda case: fixtures.call(case[0], folder), cases)
+      for (line, message), done in zip(cases, calls, strict=True):
+        with self.subTest(line):
+          self.assertEqual(done.returncode, 1, done.stderr)
+          self.assertIn(message, done.stderr)
+          self.assertNotIn("Traceback", done.stderr)
+    self.assertEqual(os.listdir(folder), ["old"])
+    self.assertEmpty(os.listdir(folder / "old"))
+
+
+if __name__ == "__main__":
+  absltest.main()
