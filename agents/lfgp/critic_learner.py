@@ -6,6 +6,7 @@ from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import CriticConfig
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.reward_source import LabelledBatch
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.critic import (
   critic_loss,
   soft_bellman_target,
@@ -14,8 +15,6 @@ from lfgp_dmc.agents.losses.critic import (
 from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.optimisation import clipped_step, make_optimiser, polyak
 from lfgp_dmc.agents.value_bounds import ValueBounds
-
-Metrics = dict[str, torch.Tensor]
 
 
 class CriticLearner:

@@ -13,8 +13,8 @@ from typing import NamedTuple, Protocol
 import torch
 
 from lfgp_dmc.agents.batches import Draw
+from lfgp_dmc.agents.losses import Metrics
 
-Metrics = dict[str, torch.Tensor]
 Update = Callable[[], Metrics]
 
 _WARM_UPS = 3  # updates before a recording, in which libraries initialise

@@ -7,6 +7,7 @@ from lfgp_dmc.agents.batches import Batch, Draw, ExpertBatch
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.reward_source import LabelledBatch, RewardSource
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.discriminator import (
   discriminator_loss,
   gradient_penalty_loss,
@@ -16,8 +17,6 @@ from lfgp_dmc.agents.networks.discriminator import Discriminator
 from lfgp_dmc.agents.optimisation import make_optimiser
 from lfgp_dmc.agents.rewards import reward_from_logits
 from lfgp_dmc.types import Episode
-
-Metrics = dict[str, torch.Tensor]
 
 
 class DiscriminatorRewards(RewardSource):

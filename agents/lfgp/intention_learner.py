@@ -6,12 +6,10 @@ from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import IntentionConfig
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.prior import Prior
-from lfgp_dmc.agents.losses.intention import intention_loss
-from lfgp_dmc.agents.losses.temperature import temperature_loss
+from lfgp_dmc.agents.losses import Metrics
+from lfgp_dmc.agents.losses.intention import intention_loss, temperature_loss
 from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.optimisation import clipped_step, frozen, make_optimiser
-
-Metrics = dict[str, torch.Tensor]
 
 _SATURATED = 0.99
 
@@ -28,7 +26,6 @@ class IntentionLearner:
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Makes the optimisers; the prior regularises the loss, if there is one."""
     self.target_entropy = config.target_entropy
     self._max_gradient_norm = optimiser.max_gradient_norm
     self._networks = networks

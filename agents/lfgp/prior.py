@@ -8,14 +8,13 @@ from absl import logging
 
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp.config import PriorConfig
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.behaviour_cloning import (
   behaviour_cloning_loss,
   divergence_loss,
 )
 from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
-
-Metrics = dict[str, torch.Tensor]
 
 _ENTROPY_ROWS = 1024  # a task
 

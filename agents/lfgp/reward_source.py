@@ -6,10 +6,9 @@ import numpy as np
 import torch
 
 from lfgp_dmc.agents.batches import Batch, Draw
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.value_bounds import ValueBounds
 from lfgp_dmc.types import Episode
-
-Metrics = dict[str, torch.Tensor]
 
 
 class LabelledBatch(NamedTuple):
