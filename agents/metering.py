@@ -17,7 +17,7 @@ class Meter:
     by_task: Sequence[str],
     device: torch.device | str = "cpu",
   ):
-    """Starts empty; metrics `by_task` are reported as `name/<task>`."""
+    """Metrics `by_task` are reported as `name/<task>`."""
     self._tasks = tuple(tasks)
     size = len(self._tasks)
     self._sums = {name: torch.zeros((), device=device) for name in scalars}

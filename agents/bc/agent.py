@@ -42,7 +42,6 @@ class BcAgent:
     shuffling: np.random.Generator,
     dtype: torch.dtype,
   ):
-    """Puts the parts together; see `build`."""
     self.tasks = tuple(tasks)
     self._config = config
     self._network = network

@@ -37,7 +37,6 @@ class LfgpAgent:
     xi: int,
     discount: float,
   ):
-    """Puts the parts together; see `builder.build`."""
     self.tasks = tuple(tasks)
     self.learner = learner
     self.batches = batches
@@ -81,12 +80,9 @@ class LfgpAgent:
   ) -> None:
     """Takes over what another agent learned (section 5.2 of the paper).
 
-    Temperatures, optimisers and scheduler stay fresh.
-
-    Args:
-      networks: `state_dict()["learner"]["networks"]` of the other agent.
-      source_tasks: its tasks.
-      updates: if a task is new, `prepare` makes so many on the replay.
+    These are `state_dict()["learner"]["networks"]` of that agent.
+    Temperatures, optimisers and scheduler stay fresh. If a task is new,
+    `prepare` makes so many updates on the replay.
 
     Raises:
       ValueError: its networks have other sizes, or none of our tasks.
@@ -122,7 +118,7 @@ class LfgpAgent:
     self._has_started = True
 
   def begin_episode(self) -> None:
-    """Starts an episode."""
+    """Makes the scheduler choose anew."""
     self._episode_step = 0
     self._scheduler.begin_episode()
 

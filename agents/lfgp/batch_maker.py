@@ -29,16 +29,7 @@ class BatchMaker:
     standardiser: Standardiser,
     generator: np.random.Generator,
   ):
-    """Keeps the sources.
-
-    Args:
-      config: which rows each reward needs.
-      rows: B.
-      replay: transitions.
-      reward_columns: of its rewards, those of the K tasks; none are used.
-      experts: demonstrations; None: this config uses none.
-      standardiser: raw observations -> network inputs, on the device.
-      generator: source of every index.
+    """Takes `reward_columns` of the replay's rewards, one a task, or none.
 
     Raises:
       ValueError: a task has no row of success where such rows are needed.

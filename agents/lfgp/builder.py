@@ -43,19 +43,10 @@ def build(
   bfloat16: bool = False,
   cuda_graphs: bool = True,
 ) -> LfgpAgent:
-  """Builds an LfGP agent; same seed and calls, same numbers.
+  """Builds an LfGP agent; all its random numbers follow from the seed.
 
-  Args:
-    config: settings.
-    tasks: names of the K tasks, the main task first.
-    demonstrations: by task; may be empty if the config uses none.
-    replay: transitions, filled by the training loop.
-    seed: every random number of the agent follows from it.
-    device: where to compute.
-    observation_size: O.
-    action_size: A.
-    bfloat16: products in bfloat16; parameters stay float32.
-    cuda_graphs: on a GPU, updates are recorded, then replayed.
+  The replay is filled by the training loop. With `bfloat16`, parameters stay
+  float32; with `cuda_graphs`, a GPU records updates, then replays them.
 
   Raises:
     ValueError: demonstrations, stored rewards or scheduler do not fit.
@@ -105,15 +96,10 @@ def make_learner(
   stored_columns: Sequence[int] = (),
   cuda_graphs: bool = False,
 ) -> LfgpLearner:
-  """Builds what trains the networks.
+  """Builds what trains the networks; noise is from `generator`.
 
-  Args:
-    config: settings.
-    networks: what to train.
-    generator: on the networks' device, source of all noise.
-    dtype: of products.
-    stored_columns: the tasks' places among stored rewards, if those are used.
-    cuda_graphs: on a GPU, updates are recorded, then replayed.
+  `stored_columns` are the tasks' places among stored rewards, if those are
+  used; products are of the dtype.
   """
   is_recorded = cuda_graphs and generator.device.type == "cuda"
   prior = None

@@ -29,7 +29,7 @@ class CriticLearner:
     dtype: torch.dtype,
     bounds: type[ValueBounds] = ValueBounds,
   ):
-    """Makes the optimiser; `bounds` are the value penalty's."""
+    """`bounds` are the value penalty's."""
     parameters = list(networks.critics.parameters())
     self.optimiser = make_optimiser(
       parameters, config.learning_rate, optimiser.weight_decay

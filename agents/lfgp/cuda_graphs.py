@@ -34,7 +34,7 @@ class CudaRecorder:
   """Records on the generator's CUDA device."""
 
   def __init__(self, generator: torch.Generator):
-    """Keeps the one source of random numbers; replays continue its stream."""
+    """The generator is the only one of updates; replays go on with it."""
     self._generator = generator
     self._stream = torch.cuda.Stream(generator.device)
 
@@ -66,7 +66,6 @@ class RecordedUpdates:
   """Makes updates by replaying them, with a recording for each kind."""
 
   def __init__(self, recorder: Recorder):
-    """Starts without recordings."""
     self._recorder = recorder
     self._seen: collections.Counter[Hashable] = collections.Counter()
     self._recordings: dict[Hashable, _Recording] = {}
@@ -74,16 +73,10 @@ class RecordedUpdates:
   def __call__(
     self, update: Callable[[Draw], Metrics], draw: Draw, phase: Hashable
   ) -> Metrics:
-    """Makes one update.
+    """Makes one update; the next call overwrites its metrics.
 
-    Args:
-      update: what to make; the same function in every call.
-      draw: its argument; the numbers are copied.
-      phase: what else decides which operations an update consists of. Each
-        phase, with each set of shapes, has a recording of its own.
-
-    Returns:
-      The metrics; the next call overwrites them.
+    Each phase, with each set of shapes in the draw, has a recording of its
+    own: they decide which operations `update` consists of.
     """
     key = (phase, *(tensor.shape for tensor in _tensors(draw)))
     recording = self._recordings.get(key)

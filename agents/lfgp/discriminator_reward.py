@@ -104,7 +104,6 @@ class _NetworkLearner:
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Makes the optimiser."""
     self.optimiser = make_optimiser(
       list(network.parameters()), config.learning_rate, weight_decay
     )

@@ -49,7 +49,7 @@ class ExampleRewards(RewardSource):
     generator: torch.Generator,
     dtype: torch.dtype,
   ):
-    """Keeps settings and networks; `batch_size` counts examples in."""
+    """`batch_size` counts examples in."""
     super().__init__()
     self._scale = config.scale
     self._policy_rows = batch_size - example_rows(config, batch_size)
@@ -103,14 +103,7 @@ def with_examples(
   """Adds states of success, in equal shares; the rest is the main task's.
 
   An example stands for staying where it is: its next state is itself, with
-  noise of its own.
-
-  Args:
-    batch: transitions of the replay.
-    pool: of all demonstrations.
-    generator: source of indices and noise.
-    rows: examples in all.
-    noise: std, in the std of the task's own demonstrations.
+  noise of its own, whose std is in those of the task's own demonstrations.
   """
   task = pool.split(rows)
   state, action = pool.sample_finals(generator, task)

@@ -32,10 +32,7 @@ class LfgpLearner:
     warmup_updates: int = 0,
     recorder: Recorder | None = None,
   ):
-    """Puts the parts together; see `builder.make_learner`.
-
-    With a recorder, updates are recorded, then replayed.
-    """
+    """With a recorder, updates are recorded, then replayed."""
     self.networks = networks
     self.reward = reward
     self.critics = critics

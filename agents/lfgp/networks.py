@@ -32,16 +32,9 @@ class LfgpNetworks:
   main_discriminator: Discriminator | None = None  # the main task's own
 
   def modules(self) -> dict[str, nn.Module]:
-    """The modules by the names used in checkpoints."""
-    modules = {
-      "intentions": self.intentions,
-      "critics": self.critics,
-      "target_critics": self.target_critics,
-      "discriminator": self.discriminator,
-      "main_discriminator": self.main_discriminator,
-      "prior": self.prior,
-    }
-    return {name: part for name, part in modules.items() if part is not None}
+    """The modules by name, which checkpoints use."""
+    fields = vars(self).items()
+    return {k: part for k, part in fields if isinstance(part, nn.Module)}
 
 
 def make_networks(
@@ -52,16 +45,7 @@ def make_networks(
   generator: torch.Generator,
   device: torch.device,
 ) -> LfgpNetworks:
-  """Draws all networks.
-
-  Args:
-    config: sizes and options.
-    tasks: K.
-    actions: A.
-    standardiser: raw observation -> input; O is its input size.
-    generator: a CPU generator, source of the initial numbers.
-    device: where to put the networks.
-  """
+  """Draws all networks from a CPU generator."""
   own = config.networks
   sizes = (tasks, own.hidden_size, actions, generator)
   critics = layouts.make_critics(
@@ -118,11 +102,7 @@ def _make_discriminators(
 
 
 def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
-  """Which network inputs stand for some floats of the observation.
-
-  Args:
-    slices: of the observation, such as "3:6,53:59".
-    standardiser: what makes inputs of it, at one scale or two.
+  """Which network inputs stand for slices of an observation, as "3:6,53:59".
 
   Raises:
     ValueError: the observation has fewer floats.

@@ -24,8 +24,6 @@ def carry_networks(
 ) -> None:
   """Carries all networks over; the targets become copies of the critics.
 
-  `source` is `LfgpLearner.state_dict()["networks"]` of the other learner.
-
   Raises:
     ValueError: its networks have other sizes or layouts.
   """
@@ -51,16 +49,10 @@ def carry_heads(
 ) -> None:
   """Carries intentions or critics over: all but the heads of other tasks.
 
-  Args:
-    module: where to; a task's heads lie on the first axis of `heads.*`, [K] or
-      [2K] with the twin leading.
-    source: `serialisation.module_state` of the same kind of module.
-    tasks: of the module.
-    source_tasks: of the source.
-    what: the module's name in error messages.
+  Heads lie on the first axis of `heads.*`: [K], or [2K], the twin leading.
 
   Raises:
-    ValueError: the networks are of other sizes or layouts.
+    ValueError: the networks are of other sizes or layouts; starts with `what`.
   """
   merged = {**source}
   for name, own in serialisation.module_state(module).items():
