@@ -63,7 +63,7 @@ class LfgpAgent:
       ValueError: it has other sizes, or none of our tasks.
     """
     self._check_common(policy.tasks, "the policy")
-    transfer.carry_heads(
+    transfer.carry(
       self.learner.networks.intentions,
       policy.arrays(),
       self.tasks,

@@ -31,18 +31,14 @@ class DiscriminatorRewards(RewardSource):
     dtype: torch.dtype,
   ):
     """Makes the optimisers, by the names of the networks."""
-    super().__init__()
-    names = ("main_discriminator", "discriminator")
-    made = {name: getattr(networks, name) for name in names}
-    made = {name: network for name, network in made.items() if network}
     parts = {
       name: _NetworkLearner(config, weight_decay, network, generator, dtype)
-      for name, network in made.items()
+      for name, network in networks.modules().items()
+      if isinstance(network, Discriminator)
     }
-    self.optimisers |= {name: part.optimiser for name, part in parts.items()}
-    self._parts = list(parts.values())
-    # How many of the K tasks each has, the main task's first.
-    self._sizes = [network.output.out_features for network in made.values()]
+    self.optimisers = {name: part.optimiser for name, part in parts.items()}
+    self._parts = list(parts.values())  # the main task's first
+    self._sizes = [part.tasks for part in self._parts]
     self._standardiser = networks.intentions.standardiser
 
   def update(self, draw: Draw) -> Metrics:
@@ -109,6 +105,7 @@ class _NetworkLearner:
     )
     self._config = config
     self._network = network
+    self.tasks = network.output.out_features  # of the K
     self._generator = generator
     self._device = network.output.weight.device
     self._dtype = dtype

@@ -50,7 +50,6 @@ class ExampleRewards(RewardSource):
     dtype: torch.dtype,
   ):
     """`batch_size` counts examples in."""
-    super().__init__()
     self._scale = config.scale
     self._policy_rows = batch_size - example_rows(config, batch_size)
     self._intentions = intentions

@@ -25,11 +25,11 @@ class LfgpNetworks:
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  # Of all tasks, or of all but the main; None: no reward comes from it.
-  discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
-  prior: IntentionNetwork | None = None  # the first intentions, frozen
   main_discriminator: Discriminator | None = None  # the main task's own
+  # Of all tasks, or of all but the main; None: no reward comes from it.
+  discriminator: Discriminator | None = None
+  prior: IntentionNetwork | None = None  # the first intentions, frozen
 
   def modules(self) -> dict[str, nn.Module]:
     """The modules by name, which checkpoints use."""
@@ -65,10 +65,10 @@ def make_networks(
     intentions=intentions,
     critics=critics,
     target_critics=_frozen_copy(critics),
-    discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
-    prior=_frozen_copy(intentions) if config.prior.weight else None,
     main_discriminator=main_discriminator,
+    discriminator=discriminator,
+    prior=_frozen_copy(intentions) if config.prior.weight else None,
   )
 
 

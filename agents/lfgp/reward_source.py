@@ -1,5 +1,7 @@
 """Where rewards come from: the interface of each source."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -29,9 +31,8 @@ class RewardSource:
   # The kind of bounds on values that follows from its rewards.
   bounds: type[ValueBounds] = ValueBounds
 
-  def __init__(self):
-    """Starts without optimisers, by the names used in checkpoints."""
-    self.optimisers: dict[str, torch.optim.Optimizer] = {}
+  # By the names used in checkpoints.
+  optimisers: Mapping[str, torch.optim.Optimizer] = MappingProxyType({})
 
   def update(self, draw: Draw) -> Metrics:
     """Trains the source, where there is something to train; its metrics."""

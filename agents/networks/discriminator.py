@@ -50,14 +50,9 @@ class Discriminator(nn.Module):
       return torch.cat([inputs, action], dim=-1)
     return inputs
 
-  def forward(self, pairs: torch.Tensor) -> torch.Tensor:
-    """Maps pairs [..., I] (see `join`) to logits, float32 [..., K]."""
-    hidden = torch.tanh(self.first(pairs))
-    return self.output(torch.tanh(self.second(hidden))).float()
-
   @torch.no_grad()
   def logits(self, pairs: torch.Tensor) -> torch.Tensor:
-    """The same without gradient, and faster."""
+    """Of pairs [..., I] (see `join`), float32 [..., K], without gradient."""
     hidden = tanh_(self.first(pairs))
     return self.output(tanh_(self.second(hidden))).float()
 
