@@ -52,7 +52,6 @@ class Policy:
     self.tasks = tuple(tasks)
     self.deterministic = deterministic
     self._network = network
-    self._indices = {task: index for index, task in enumerate(self.tasks)}
     self._device = network.standardiser.mean.device
     self._task = self.tasks[0]
     self._generator = np.random.default_rng(0)
@@ -199,9 +198,8 @@ class Policy:
     return action if raw.dim() > 1 else action[0]
 
   def _index(self, task: str) -> int:
-    try:
-      return self._indices[task]
-    except KeyError:
+    if task not in self.tasks:
       raise ValueError(
         f"the policy has no task {task!r}; valid: {', '.join(self.tasks)}"
-      ) from None
+      )
+    return self.tasks.index(task)
