@@ -8,7 +8,7 @@ from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp.config import (
   DiscriminatorReward,
   ExampleReward,
-  RewardConfig,
+  LfgpConfig,
 )
 from lfgp_dmc.agents.lfgp.device_replay import DeviceReplay
 from lfgp_dmc.agents.lfgp.example_reward import example_rows, with_examples
@@ -21,8 +21,7 @@ class BatchMaker:
 
   def __init__(
     self,
-    config: RewardConfig,
-    rows: int,
+    config: LfgpConfig,
     replay: Replay,
     reward_columns: list[int],
     experts: ExpertPool | None,
@@ -34,8 +33,7 @@ class BatchMaker:
     Raises:
       ValueError: a task has no row of success where such rows are needed.
     """
-    self._config = config
-    self._rows = rows
+    self._config, self._rows = config.reward, config.batch_size
     self._replay = replay
     self._columns = reward_columns
     self._experts = experts
@@ -45,8 +43,9 @@ class BatchMaker:
     self._mirror = None
     if self._device.type != "cpu":
       self._mirror = DeviceReplay(replay, self._device)
-    if isinstance(config, ExampleReward) or (
-      isinstance(config, DiscriminatorReward) and config.final_share > 0
+    reward = self._config
+    if isinstance(reward, ExampleReward) or (
+      isinstance(reward, DiscriminatorReward) and reward.final_share > 0
     ):
       self._pool.check_finals()
 

@@ -20,7 +20,7 @@ from lfgp_dmc.agents.lfgp.discriminator_reward import DiscriminatorRewards
 from lfgp_dmc.agents.lfgp.example_reward import ExampleRewards
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, make_networks
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, Training, make_networks
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
@@ -67,13 +67,7 @@ def build(
   columns = replay.reward_columns(tasks) if config.keeps_rewards else []
   learner = make_learner(config, networks, noise, dtype, columns, cuda_graphs)
   batches = BatchMaker(
-    config.reward,
-    config.batch_size,
-    replay,
-    columns,
-    experts,
-    standardiser,
-    random("sampling"),
+    config, replay, columns, experts, standardiser, random("sampling")
   )
   return LfgpAgent(
     tasks,
@@ -105,18 +99,13 @@ def make_learner(
   prior = None
   if networks.prior is not None:
     prior = Prior(config.prior, networks.prior, generator.device)
-  reward = _make_reward(config, networks, generator, dtype, stored_columns)
-  critics = CriticLearner(
-    config.critic, config.optimiser, networks, generator, dtype, reward.bounds
-  )
-  intentions = IntentionLearner(
-    config.intention, config.optimiser, networks, prior, generator, dtype
-  )
+  shared = Training(networks, config.optimiser, generator, dtype)
+  reward = _make_reward(config, shared, stored_columns)
   return LfgpLearner(
     networks,
     reward,
-    critics,
-    intentions,
+    CriticLearner(config.critic, shared, reward.bounds),
+    IntentionLearner(config.intention, shared, prior),
     prior,
     generator,
     config.critic.warmup_updates,
@@ -125,20 +114,11 @@ def make_learner(
 
 
 def _make_reward(
-  config: LfgpConfig,
-  networks: LfgpNetworks,
-  generator: torch.Generator,
-  dtype: torch.dtype,
-  stored_columns: Sequence[int],
+  config: LfgpConfig, shared: Training, stored_columns: Sequence[int]
 ) -> RewardSource:
   match config.reward:
     case DiscriminatorReward() as own:
-      decay = config.optimiser.weight_decay
-      return DiscriminatorRewards(own, decay, networks, generator, dtype)
+      return DiscriminatorRewards(own, shared)
     case ExampleReward() as own:
-      intentions = networks.intentions
-      tasks = len(networks.log_temperature)
-      return ExampleRewards(
-        own, config.batch_size, intentions, tasks, generator, dtype
-      )
+      return ExampleRewards(own, config.batch_size, shared)
   return StoredRewards(config.reward, stored_columns[0])

@@ -8,7 +8,7 @@ written in place, never a Python number.
 
 import collections
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import torch
 
@@ -18,16 +18,6 @@ from lfgp_dmc.agents.losses import Metrics
 Update = Callable[[], Metrics]
 
 _WARM_UPS = 3  # updates before a recording, in which libraries initialise
-
-
-class Recorder(Protocol):
-  """Runs and records updates; `CudaRecorder`, or a test's."""
-
-  def warm_up(self, update: Update, /) -> Metrics:
-    """Makes an update as a later recording requires."""
-
-  def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
-    """Records an update without making it: its metrics, and its replay."""
 
 
 class CudaRecorder:
@@ -48,7 +38,7 @@ class CudaRecorder:
     return metrics
 
   def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
-    """Records a CUDA graph."""
+    """Records an update without making it: its metrics, and its replay."""
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(self._generator)
     with torch.cuda.graph(graph, stream=self._stream):
@@ -65,7 +55,7 @@ class _Recording(NamedTuple):
 class RecordedUpdates:
   """Makes updates by replaying them, with a recording for each kind."""
 
-  def __init__(self, recorder: Recorder):
+  def __init__(self, recorder: CudaRecorder):
     self._recorder = recorder
     self._seen: collections.Counter[Hashable] = collections.Counter()
     self._recordings: dict[Hashable, _Recording] = {}

@@ -10,7 +10,7 @@ import torch
 from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.batches import Draw
 from lfgp_dmc.agents.lfgp.critic_learner import CriticLearner
-from lfgp_dmc.agents.lfgp.cuda_graphs import RecordedUpdates, Recorder
+from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder, RecordedUpdates
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.prior import Prior
@@ -30,7 +30,7 @@ class LfgpLearner:
     prior: Prior | None,
     generator: torch.Generator,
     warmup_updates: int = 0,
-    recorder: Recorder | None = None,
+    recorder: CudaRecorder | None = None,
   ):
     """With a recorder, updates are recorded, then replayed."""
     self.networks = networks

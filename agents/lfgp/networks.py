@@ -2,12 +2,13 @@
 
 import copy
 import dataclasses
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import torch
 from torch import nn
 
 from lfgp_dmc.agents import fields
+from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, LfgpConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork
@@ -37,6 +38,15 @@ class LfgpNetworks:
     return {k: part for k, part in fields if isinstance(part, nn.Module)}
 
 
+class Training(NamedTuple):
+  """What all parts of an update have in common."""
+
+  networks: LfgpNetworks
+  optimiser: OptimiserConfig
+  generator: torch.Generator
+  dtype: torch.dtype
+
+
 def make_networks(
   config: LfgpConfig,
   tasks: int,
@@ -55,50 +65,32 @@ def make_networks(
   intentions = layouts.make_intentions(
     own.layout, standardiser, *sizes, trunk
   ).to(device)
-  main_discriminator, discriminator = None, None
-  if isinstance(config.reward, DiscriminatorReward):
-    main_discriminator, discriminator = _make_discriminators(
-      config.reward, *sizes, standardiser, device
-    )
   initial = torch.tensor(config.intention.initial_temperature).log()
-  return LfgpNetworks(
+  networks = LfgpNetworks(
     intentions=intentions,
     critics=critics,
     target_critics=_frozen_copy(critics),
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
-    main_discriminator=main_discriminator,
-    discriminator=discriminator,
     prior=_frozen_copy(intentions) if config.prior.weight else None,
   )
-
-
-def _make_discriminators(
-  config: DiscriminatorReward,
-  tasks: int,
-  hidden: int,
-  actions: int,
-  generator: torch.Generator,
-  standardiser: Standardiser,
-  device: torch.device,
-) -> tuple[Discriminator | None, Discriminator]:
-  """The main task's own, if it has one, and that of all other tasks."""
+  reward = config.reward
+  if not isinstance(reward, DiscriminatorReward):
+    return networks
 
   def make(count: int, masked: str) -> Discriminator:
-    return Discriminator(
-      count,
-      standardiser.input_size,
-      actions,
-      hidden,
-      generator,
-      config.input,
-      masked_inputs(masked, standardiser),
-    ).to(device)
+    sizes = count, standardiser.input_size, actions, own.hidden_size
+    unseen = masked_inputs(masked, standardiser)
+    network = Discriminator(*sizes, generator, reward.input, unseen)
+    return network.to(device)
 
-  if not config.main_masked:
-    return None, make(tasks, config.masked)
-  if tasks == 1:  # there are no others
-    return None, make(1, config.main_masked)
-  return make(1, config.main_masked), make(tasks - 1, config.masked)
+  masked = reward.masked
+  if reward.main_masked and tasks == 1:  # there are no others
+    masked = reward.main_masked
+  elif reward.main_masked:
+    networks.main_discriminator = make(1, reward.main_masked)
+    tasks -= 1
+  networks.discriminator = make(tasks, masked)
+  return networks
 
 
 def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
