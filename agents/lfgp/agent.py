@@ -11,6 +11,7 @@ from lfgp_dmc import seeding
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import transfer
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
@@ -26,6 +27,7 @@ class LfgpAgent:
 
   def __init__(
     self,
+    config: LfgpConfig,
     tasks: Sequence[str],
     learner: LfgpLearner,
     batches: BatchMaker,
@@ -33,9 +35,6 @@ class LfgpAgent:
     pretraining: Pretraining,
     experts: ExpertPool | None,
     seed: int,
-    *,
-    xi: int,
-    discount: float,
   ):
     self.tasks = tuple(tasks)
     self.learner = learner
@@ -45,7 +44,7 @@ class LfgpAgent:
     self._pretraining = pretraining
     self._experts = experts
     self._acting = seeding.generator(seed, "acting")
-    self._xi, self._discount = xi, discount
+    self._xi, self._discount = config.scheduler.xi, config.critic.discount
     device = learner.networks.log_temperature.device
     self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, device)
     self._choices = np.zeros(len(self.tasks), np.int64)

@@ -70,6 +70,7 @@ def build(
     config, replay, columns, experts, standardiser, random("sampling")
   )
   return LfgpAgent(
+    config,
     tasks,
     learner,
     batches,
@@ -77,8 +78,6 @@ def build(
     Pretraining(config.pretraining, config.optimiser, config.batch_size, dtype),
     experts,
     seed,
-    xi=config.scheduler.xi,
-    discount=config.critic.discount,
   )
 
 
