@@ -76,6 +76,7 @@ class LfgpAgent:
     networks: Mapping[str, Mapping[str, np.ndarray]],
     source_tasks: Sequence[str],
     updates: int = 0,
+    main_head: bool = False,
   ) -> None:
     """Takes over what another agent learned (section 5.2 of the paper).
 
@@ -83,14 +84,31 @@ class LfgpAgent:
     Temperatures, optimisers and scheduler stay fresh. If a task is new,
     `prepare` makes so many updates on the replay.
 
+    Args:
+      networks: by name.
+      source_tasks: their tasks, the main task first.
+      updates: see above.
+      main_head: the heads of the other main task become those of ours, as the
+        released code has it for Stack -> Unstack-Stack.
+
     Raises:
-      ValueError: its networks have other sizes, or none of our tasks.
+      ValueError: its networks have other sizes, or none of our tasks; or its
+        main task is another task of ours.
     """
     self._check_common(source_tasks, "the other run")
+    is_any_new = bool(set(self.tasks) - set(source_tasks))
+    if main_head:
+      main, *others = source_tasks
+      if main in self.tasks:
+        raise ValueError(
+          f"the other run's main task {main} is a task of this run: its head "
+          "is carried over under its own name"
+        )
+      source_tasks = (self.tasks[0], *others)
     own = self.learner.networks
     transfer.carry_networks(own, networks, self.tasks, source_tasks)
     self._refresh_inputs()
-    if set(self.tasks) - set(source_tasks):
+    if is_any_new:
       self._first_updates = updates
 
   def prepare(self, progress_bar: bool = False) -> None:
