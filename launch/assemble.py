@@ -41,7 +41,7 @@ def make_parts(config: RunConfig) -> Parts:
   """
   device = _set_up_torch(config)
   with command.checked_input():
-    environment = config.world.build(config.keeps_rewards)
+    environment = config.environment_spec.build(config.agent.keeps_rewards)
     tasks = tasks_of(config, environment)
     widths = environments.widths(environment)
   demonstrations = datasets.load(config, tasks, widths)
@@ -64,7 +64,7 @@ def make_replay(
 ) -> Replay:
   """An empty replay, or the one that the folder holds."""
   reward_tasks: tuple[str, ...] = ()
-  if config.keeps_rewards:  # all that are observed, for transfers
+  if config.agent.keeps_rewards:  # all that are observed, for transfers
     reward_tasks = environments.tasks_with_rewards(
       parts.environment, parts.tasks
     )
@@ -105,7 +105,7 @@ def make_run(
   replay = None if is_supervised else make_replay(config, parts, folder.replay)
   evaluate = functools.partial(
     evaluation.evaluate,
-    config.world.factory(show_rewards=True),
+    functools.partial(config.environment_spec.build, True),
     functools.partial(policies.stored_policy, os.fspath(folder.path)),
     parts.tasks,
     config.evaluation_episodes,

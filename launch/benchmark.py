@@ -8,6 +8,7 @@ python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
 
 import csv
+import functools
 import pathlib
 from collections.abc import Iterator
 
@@ -104,5 +105,7 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
       yield from stability.measure(_TASKS.value, steps, _SEED.value)
 
 
+cli = functools.partial(command.run, main, define_flags=config_flags.define)
+
 if __name__ == "__main__":
-  command.run(main, define_flags=config_flags.define)
+  cli()

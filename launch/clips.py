@@ -44,7 +44,7 @@ def play(
   if task == SCHEDULED:
     look = dataclasses.replace(look, scheduled_for=spec.main_task)
     switch = scheduled(spec, seed)
-  environment = spec.world.build(seed=seeding.derive(seed, "clip"))
+  environment = spec.environment_spec.build(seed=seeding.derive(seed, "clip"))
   with contextlib.closing(environment):
     if is_play:
       tasks = lfgp_dmc.task_set(spec.main_task)

@@ -10,6 +10,7 @@ takes all local ones under `ID/`; of others' datasets --attributes says what our
 files need: --attributes=task=stack,expert=human,...
 """
 
+import functools
 import pathlib
 
 from absl import flags
@@ -77,5 +78,7 @@ def _attributes() -> dict[str, str | int]:
   return values
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

@@ -24,7 +24,7 @@ def load(
   Raises:
     UserError: the dataset cannot be used; one line a faulty file.
   """
-  if not config.uses_demonstrations:
+  if not config.agent.uses_demonstrations:
     return {}
   if not config.demonstrations:
     raise UserError(
@@ -112,12 +112,6 @@ def _collect(config: RunConfig) -> None:
   arguments = [sys.executable, str(_COLLECT), *command.split()[2:]]
   if subprocess.run(arguments).returncode:
     raise UserError(f"{config.demonstrations} could not be collected")
-
-
-def pairs(found: dict[str, Demonstrations]) -> str:
-  """Such as "7 tasks, 63000 pairs"."""
-  total = sum(len(data) for data in found.values())
-  return f"{len(found)} tasks, {total} pairs"
 
 
 def _command(config: RunConfig, pairs_per_task: str) -> str:

@@ -145,7 +145,9 @@ def _stored_policy(main_task: str) -> policies.PolicySpec | None:
 
 def _world(config: RunConfig, stored: policies.PolicySpec) -> EnvironmentSpec:
   """The run's environment, at the control rate of the stored policy."""
-  return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
+  return dataclasses.replace(
+    config.environment_spec, control_hz=stored.environment_spec.control_hz
+  )
 
 
 def _evaluate(
@@ -157,7 +159,7 @@ def _evaluate(
 ) -> list[EvaluationRow]:
   print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(
-    (world or config.world).factory(show_rewards=True),
+    (world or config.environment_spec).factory(show_rewards=True),
     make_actor,
     tasks,
     config.evaluation_episodes,
@@ -179,7 +181,9 @@ def _film(
   if graphics.fault():
     return None
   chosen = choose_episodes(config.main_task, columns["trained"])
-  frames = _play(config.world, policies.stored_policy(str(path)), chosen)
+  frames = _play(
+    config.environment_spec, policies.stored_policy(str(path)), chosen
+  )
   shown = [(path.name, row) for row in chosen]
   if stored is not None:
     best = choose_episodes(config.main_task, columns["stored"])[:1]
@@ -239,5 +243,9 @@ def choose_episodes(
   return sorted(best.values(), key=rank)[:_CLIPS]
 
 
+cli = functools.partial(
+  command.run, main, render=True, define_flags=config_flags.define
+)
+
 if __name__ == "__main__":
-  command.run(main, render=True, define_flags=config_flags.define)
+  cli()

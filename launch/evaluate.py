@@ -7,6 +7,7 @@ Every intention plays whole episodes in the main task's environment, by its
 mean action; the reset of episode i depends on (--seed, i) alone.
 """
 
+import functools
 import pathlib
 from collections.abc import Sequence
 
@@ -22,18 +23,21 @@ from lfgp_dmc.task_names import CONTROL_RATES
 _NAME = "evaluation.csv"
 
 _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
-_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_EXPERT = flags.DEFINE_enum(
+  "expert", None, [policies.SCRIPTED], "Instead of --run."
+)
 _TASKS = flags.DEFINE_string(
   "tasks",
   "",
   "Comma-separated intentions, or all; default: the main task alone.",
 )
-_EPISODES = flags.DEFINE_integer("episodes", 50, "Episodes a task.")
-_SEED = flags.DEFINE_integer("seed", 0, "Of the resets.")
-_WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.")
-_MAIN_TASK = flags.DEFINE_string(
+_EPISODES = flags.DEFINE_integer("episodes", 50, "Episodes a task.", 1)
+_SEED = flags.DEFINE_integer("seed", 0, "Of the resets.", 0)
+_WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.", 0)
+_MAIN_TASK = flags.DEFINE_enum(
   "main_task",
-  "",
+  None,
+  lfgp_dmc.ALL_TASKS,
   "With --expert: whose environment; default: each task in its own.",
 )
 _HERTZ = flags.DEFINE_integer(
@@ -49,15 +53,12 @@ _OUTPUT = flags.DEFINE_string(
 
 def main() -> None:
   """Plays, prints the table, and writes the rows."""
-  command.check_least("episodes", _EPISODES.value, 1)
-  command.check_least("seed", _SEED.value, 0)
-  command.check_least("workers", _WORKERS.value, 0)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
   rows: list[evaluation_csv.EvaluationRow] = []
   for spec, tasks in _plan():
     rows += evaluation.evaluate(
-      spec.world.factory(show_rewards=True),
+      functools.partial(spec.environment_spec.build, True),
       spec.make,
       tasks,
       _EPISODES.value,
@@ -76,26 +77,18 @@ def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
   if _RUN.value or not _EXPERT.value:
     spec = policies.find(_RUN.value, _EXPERT.value)
     return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
-  command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
-  own = _MAIN_TASK.value
-  if own:
-    command.check_choice("main_task", own, lfgp_dmc.ALL_TASKS)
-  default = own or lfgp_dmc.MAIN_TASKS[0]
-  tasks = choose_tasks(
-    _TASKS.value, lfgp_dmc.task_set(own) if own else lfgp_dmc.ALL_TASKS, default
+  expert = functools.partial(
+    policies.find, "", policies.SCRIPTED, control_hz=_HERTZ.value
   )
-  if own:
-    return [(_scripted(own), tasks)]
-  return [(_scripted(task), (task,)) for task in tasks]
+  if own := _MAIN_TASK.value:
+    return [
+      (expert(task=own), choose_tasks(_TASKS.value, lfgp_dmc.task_set(own)))
+    ]
+  tasks = choose_tasks(_TASKS.value, lfgp_dmc.ALL_TASKS)
+  return [(expert(task=task), (task,)) for task in tasks]
 
 
-def _scripted(task: str) -> policies.PolicySpec:
-  return policies.find("", policies.SCRIPTED, task, _HERTZ.value)
-
-
-def choose_tasks(
-  requested: str, known: tuple[str, ...], default: str = ""
-) -> tuple[str, ...]:
+def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
   """The tasks of `--tasks`.
 
   Raises:
@@ -110,7 +103,7 @@ def choose_tasks(
       f"--tasks: unknown {', '.join(unknown)}; valid: all, or some of "
       f"{', '.join(known)}"
     )
-  return tuple(dict.fromkeys(names)) or (default or known[0],)
+  return tuple(dict.fromkeys(names)) or known[:1]
 
 
 def _output() -> pathlib.Path | None:
@@ -142,5 +135,7 @@ def add_rows(
   evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

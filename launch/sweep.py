@@ -15,6 +15,7 @@ a run whose node is lost is resumed on another.
 """
 
 import collections
+import functools
 import pathlib
 import signal
 import time
@@ -230,5 +231,7 @@ def _last_words(log: pathlib.Path, status: int) -> tuple[str, bool]:
   return message, is_reported
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

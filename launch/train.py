@@ -8,6 +8,7 @@ The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
 events, checkpoints/, replay/ and policy.safetensors.
 """
 
+import functools
 import pathlib
 
 from absl import flags
@@ -83,5 +84,7 @@ def _config() -> configs.RunConfig:
       raise UserError(f"{_RUN.value}/config.json: {error}") from None
 
 
+cli = functools.partial(command.run, main, define_flags=config_flags.define)
+
 if __name__ == "__main__":
-  command.run(main, define_flags=config_flags.define)
+  cli()

@@ -9,7 +9,6 @@ from lfgp_dmc.launch.configs.resolve import (
   from_dict,
   hint,
   make_config,
-  to_run_config,
 )
 from lfgp_dmc.launch.configs.run_config import RunConfig
 
@@ -24,5 +23,4 @@ __all__ = [
   "from_dict",
   "hint",
   "make_config",
-  "to_run_config",
 ]

@@ -37,9 +37,9 @@ def make_config(
   """All fields of a run with their defaults, locked.
 
   Args:
-    algorithm: a name in `ALGORITHMS`; it decides the fields of `agent`.
-    preset: a name in `PRESETS`.
-    main_task: some presets differ by it.
+    algorithm: decides the fields of `agent`.
+    preset: changes defaults, some by the main task.
+    main_task: as above.
     kinds: such as {"agent.scheduler.kind": "uniform"}; they decide the fields
       of their groups.
 
@@ -78,17 +78,8 @@ def make_config(
   return config
 
 
-def to_run_config(config: ml_collections.ConfigDict) -> RunConfig:
-  """Checks a config and freezes it.
-
-  Raises:
-    ValueError: a value out of its range; one line a fault.
-  """
-  return from_dict(config.to_dict())
-
-
 def from_dict(values: Mapping[str, Any]) -> RunConfig:
-  """Reads a config back from nested values, such as a run's `config.json`.
+  """Checks and freezes nested values, such as those of a `config.json`.
 
   A field that is not there, since the run is older than it, has its default.
   In paths, {main_task} and {source_task} (of a transfer) are filled in.
