@@ -27,10 +27,10 @@ def play(
   """Records one episode, in an environment of its own.
 
   Args:
-    spec: the policy.
+    spec: of the policy.
     task: an intention, or `SCHEDULED`.
     seed: of the reset, the policy and the choice of tasks.
-    look: how frames are made.
+    look: of the frames.
     is_play: whether the expert goes from task to task.
     **limits: see `recorder.record`.
 

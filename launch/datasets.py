@@ -16,10 +16,7 @@ _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 def load(
   config: RunConfig, tasks: Sequence[str], widths: tuple[int, int]
 ) -> dict[str, Demonstrations]:
-  """Task -> demonstrations, checked against the environment's widths.
-
-  Returns:
-    Those of the dataset's folder, or none if the agent uses none.
+  """Task -> demonstrations; none if the agent uses none.
 
   Raises:
     UserError: the dataset cannot be used; one line a faulty file.

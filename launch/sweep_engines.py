@@ -88,11 +88,7 @@ class RayEngine:
   """
 
   def __init__(self, address: str, slots: int = 0):
-    """Connects.
-
-    Args:
-      address: of the cluster, such as auto.
-      slots: runs at a time; 0: as many as the cluster has cores.
+    """Connects; `slots` 0: as many runs as the cluster has cores.
 
     Raises:
       UserError: Ray is not installed, or there is no such cluster.
@@ -170,12 +166,8 @@ def popen(
 ) -> subprocess.Popen:
   """Starts `launch/train.py` in a process group of its own.
 
-  Signals of the terminal do not reach it: the sweep passes one on, once.
-
-  Args:
-    arguments: of `launch/train.py`.
-    log: gets the command, the place and the output at its end.
-    place: name of this machine.
+  Signals of the terminal do not reach it: the sweep passes one on, once. The
+  log gets the command, the place and the output.
   """
   log.parent.mkdir(parents=True, exist_ok=True)
   with open(log, "a", encoding="utf-8") as output:
@@ -183,15 +175,9 @@ def popen(
     lead = "\n" if output.tell() else ""
     output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
     output.flush()
+    python, starter = sys.executable, str(os.getpid())
     return subprocess.Popen(
-      [
-        sys.executable,
-        str(_CHILD),
-        str(os.getpid()),
-        sys.executable,
-        str(_TRAIN),
-        *arguments,
-      ],
+      [python, str(_CHILD), starter, python, str(_TRAIN), *arguments],
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,

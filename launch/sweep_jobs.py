@@ -81,12 +81,8 @@ def make_jobs(
     main_tasks: of the others.
     seeds: of each.
     runs: folder for the runs.
-    arguments: more of `launch/train.py` for every run; `{runs}` and `{seed}`
-      are filled in.
-    flags: folder of the flagfiles.
-
-  Returns:
-    The jobs; those without a flagfile are in state `MISSING`.
+    arguments: more of `launch/train.py`; `{runs}` and `{seed}` are filled in.
+    flags: folder of the flagfiles; jobs that find none are `MISSING`.
   """
   jobs = []
   for seed in seeds:
@@ -140,9 +136,8 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
       job.after = f"{source}_{job.seed}"
       folder = job.folder.with_name(job.after)
       job.arguments = (*job.arguments, f"--{field}={folder}")
-      if (
-        job.after not in known and not _is_done(folder) and job.state == WAITING
-      ):
+      is_there = job.after in known or _is_done(folder)
+      if job.state == WAITING and not is_there:
         job.state, job.message = HELD, f"{job.after} is not part of the sweep"
 
 
@@ -166,20 +161,13 @@ def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
   rows = []
   for job in jobs:
     step, success = _last_success(job.folder)
+    found = {
+      "env_step": step,
+      "success": success,
+      "wall_s": f"{job.wall_s:.0f}",
+    }
     rows.append(
-      {
-        "name": job.name,
-        "algorithm": job.algorithm,
-        "main_task": job.main_task,
-        "seed": job.seed,
-        "state": job.state,
-        "attempts": job.attempts,
-        "wall_s": f"{job.wall_s:.0f}",
-        "env_step": step,
-        "success": success,
-        "folder": job.folder,
-        "message": job.message,
-      }
+      {k: found[k] if k in found else getattr(job, k) for k in COLUMNS}
     )
   csv_files.write(index, COLUMNS, rows)
 

@@ -27,9 +27,7 @@ _DTYPES = {"fp32": torch.float32, "bf16": torch.bfloat16}
 def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
   """Measures updates and matrix products, in fp32 and bf16, 1 and 2 threads.
 
-  Args:
-    config: whose agent; data are made up.
-    seconds: about how long each measurement takes.
+  Each measurement takes about `seconds`.
 
   Yields:
     `gflop/<term>` and their sum `gflop_per_update` (see `operations.py`);
@@ -86,11 +84,11 @@ def tasks_of(config: RunConfig) -> tuple[str, ...]:
 
 
 def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
-  """The config's agent on made-up demonstrations.
+  """The config's agent, without pretraining, on made-up data.
 
   Args:
-    config: a run's; without its pretraining.
-    replay: where its transitions are; None makes some up.
+    config: of a run.
+    replay: of its transitions; None makes some up.
     bfloat16: overrides the config's.
   """
   tasks = tasks_of(config)

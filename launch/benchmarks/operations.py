@@ -14,17 +14,7 @@ from lfgp_dmc.agents.networks import layouts
 def gflop_of_update(
   config: LfgpConfig, tasks: int, observations: int, actions: int
 ) -> dict[str, float]:
-  """The terms of one update, in GFLOP.
-
-  Args:
-    config: batch sizes, layout and width.
-    tasks: K.
-    observations: O.
-    actions: A.
-
-  Returns:
-    Term -> GFLOP; the sum is what the update needs.
-  """
+  """The terms of one update of K tasks, in GFLOP; their sum is its need."""
   hidden, rows = config.networks.hidden_size, config.batch_size
   shared = observations * hidden + hidden * hidden
   if config.networks.layout == layouts.SEPARATE:
