@@ -3,12 +3,11 @@
 import dataclasses
 import importlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import dm_env
 
 import lfgp_dmc
-from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.task_names import check_task
 
 
@@ -46,19 +45,6 @@ class EnvironmentSpec:
       _imported(self.environment)
     else:
       check_task(self.main_task)
-
-
-def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:
-  """The tasks whose success is observable, `main_task` first."""
-  spec = environment.observation_spec()
-  found = []
-  if isinstance(spec, Mapping):
-    found = [
-      name.removeprefix(SUCCESS_PREFIX)
-      for name in spec
-      if name.startswith(SUCCESS_PREFIX)
-    ]
-  return (main_task, *(task for task in found if task != main_task))
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:

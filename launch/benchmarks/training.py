@@ -73,8 +73,8 @@ def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
   )
   with tempfile.TemporaryDirectory() as folder:
     log = MetricsLog(folder)
-    progress = loop.train(
-      environment, agent, replay, schedule, log, progress=progress
-    )
+    progress = loop.EpisodeRounds(
+      environment, agent, replay, schedule, log, progress
+    ).run()
     log.close()
   return progress

@@ -104,21 +104,14 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
   return np.asarray(rewards, np.float32)
 
 
-def tasks_with_rewards(
-  environment: dm_env.Environment, tasks: Sequence[str]
+def with_observed_tasks(
+  environment: dm_env.Environment, tasks: Sequence[str], prefix: str
 ) -> tuple[str, ...]:
-  """`tasks`, then all others whose reward is an observable.
-
-  A replay that keeps all of these can be transferred to any of the tasks.
-  """
+  """`tasks`, then all others that have an observable with the prefix."""
   spec = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
-  shown = [
-    name.removeprefix(observations.REWARD_PREFIX)
-    for name in names
-    if name.startswith(observations.REWARD_PREFIX)
-  ]
-  return (*tasks, *(task for task in shown if task not in tasks))
+  shown = [n.removeprefix(prefix) for n in names if n.startswith(prefix)]
+  return tuple(dict.fromkeys((*tasks, *shown)))
 
 
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:

@@ -32,7 +32,7 @@ class Rounds(abc.ABC, Generic[_Agent]):
     agent: _Agent,
     schedule: TrainSchedule,
     log: MetricsLog,
-    progress: Progress | None,
+    progress: Progress | None = None,
   ):
     """Starts the clock.
 
@@ -50,7 +50,9 @@ class Rounds(abc.ABC, Generic[_Agent]):
     self._mark = self._counts()  # of the last row
 
   def run(
-    self, evaluate_fn: EvaluateFn | None, checkpoint_fn: CheckpointFn | None
+    self,
+    evaluate_fn: EvaluateFn | None = None,
+    checkpoint_fn: CheckpointFn | None = None,
   ) -> Progress:
     """Trains to the end, or to a signal.
 
