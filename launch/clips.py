@@ -58,11 +58,7 @@ def play(
 
 
 def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
-  """The run's own scheduler, as of its last checkpoint.
-
-  Raises:
-    UserError: a policy folder has no scheduler.
-  """
+  """The run's own scheduler, as of its last checkpoint."""
   if spec.folder is None or "agent" not in spec.config:
     raise command.UserError("--task=scheduled needs the folder of a whole run")
   from lfgp_dmc.agents.schedulers import make_scheduler

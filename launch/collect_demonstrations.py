@@ -94,11 +94,7 @@ def main() -> int:
 
 
 def _plan() -> CollectionPlan:
-  """Who plays what, where.
-
-  Raises:
-    UserError: the expert cannot do all tasks, or acts at another rate.
-  """
+  """Who plays what, where; the expert must know all tasks, at this rate."""
   spec = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
   make_actor = spec.make
   if _EXPERT.value != policies.SCRIPTED:

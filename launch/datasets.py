@@ -48,11 +48,7 @@ def load(
 def _counted(
   config: RunConfig, found: dict[str, Demonstrations]
 ) -> dict[str, Demonstrations]:
-  """The first `pairs_per_task` pairs of each task.
-
-  Raises:
-    UserError: a task has fewer.
-  """
+  """The first `pairs_per_task` pairs of each task, if it has them."""
   if not config.pairs_per_task:
     return found
   short = [
@@ -63,8 +59,7 @@ def _counted(
   if short:
     raise UserError(
       f"config.pairs_per_task is {config.pairs_per_task}; "
-      f"{config.demonstrations} has fewer "
-      f"pairs of {', '.join(short)}"
+      f"{config.demonstrations} has fewer pairs of {', '.join(short)}"
     )
   return {
     task: data.head(config.pairs_per_task) for task, data in found.items()
@@ -97,11 +92,7 @@ def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
 
 
 def _collect(config: RunConfig) -> None:
-  """Collects the dataset if `config.collect_pairs` says so.
-
-  Raises:
-    UserError: it could not be collected.
-  """
+  """Collects the dataset if `config.collect_pairs` says so."""
   if not config.collect_pairs:
     return
   command = _command(config, str(config.collect_pairs))

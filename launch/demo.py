@@ -125,11 +125,7 @@ def _columns(
 
 
 def _stored_policy(main_task: str) -> policies.PolicySpec | None:
-  """The policy to show beside the fresh one, if there is any.
-
-  Raises:
-    UserError: `--stored` names no policy that can do the task.
-  """
+  """The policy to show beside the fresh one, if there is any."""
   folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
@@ -148,10 +144,7 @@ def _at_rate_of(stored: policies.PolicySpec, config: RunConfig) -> RunConfig:
 
 
 def _evaluate(
-  config: RunConfig,
-  name: str,
-  make_actor: Callable[[], Actor],
-  tasks: Sequence[str],
+  config: RunConfig, name: str, make_actor: Callable, tasks: Sequence[str]
 ) -> list[EvaluationRow]:
   print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(

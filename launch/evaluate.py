@@ -89,11 +89,7 @@ def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
 
 
 def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
-  """The tasks of `--tasks`.
-
-  Raises:
-    UserError: one that is not known.
-  """
+  """The tasks of `--tasks`; raises UserError if one is not known."""
   if requested == "all":
     return known
   names = tuple(name.strip() for name in requested.split(",") if name.strip())
@@ -107,11 +103,7 @@ def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _output() -> pathlib.Path | None:
-  """The file the rows go to; None: only the table is printed.
-
-  Raises:
-    UserError: the file of `--output` exists.
-  """
+  """The file the rows go to; None: only the table is printed."""
   if not _OUTPUT.value:
     return pathlib.Path(_RUN.value) / _NAME if _RUN.value else None
   path = pathlib.Path(_OUTPUT.value) / _NAME
@@ -123,11 +115,7 @@ def _output() -> pathlib.Path | None:
 def add_rows(
   path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
 ) -> None:
-  """Appends the rows that the file does not have; makes it if missing.
-
-  Raises:
-    UserError: the file is no evaluation.
-  """
+  """Appends the rows that the file, an evaluation if it exists, has not."""
   path.parent.mkdir(parents=True, exist_ok=True)
   with command.checked_input():
     known = evaluation_csv.read_csv(path) if path.exists() else []

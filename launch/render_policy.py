@@ -189,11 +189,7 @@ def _grid() -> tuple[int, int]:
 def _output(
   stem: str, formats: tuple[str, ...] = video.FORMATS
 ) -> pathlib.Path:
-  """Where the picture goes.
-
-  Raises:
-    UserError: an unknown suffix, or the file exists.
-  """
+  """The path of the picture: a new file of a known format."""
   default = f"videos/{stem}{formats[0]}".replace(" ", "_")
   output = pathlib.Path(_OUTPUT.value or default)
   if output.suffix not in formats:

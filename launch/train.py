@@ -65,11 +65,7 @@ def report(
 
 
 def _config() -> configs.RunConfig:
-  """The config of the flags, or on a bare --resume the run's own.
-
-  Raises:
-    UserError: a wrong value, or --resume without --run.
-  """
+  """The config of the flags, or on a bare --resume the run's own."""
   with command.checked_input():
     if not _RESUME.value:
       return config_flags.resolved()

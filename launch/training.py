@@ -24,9 +24,6 @@ def train(
 ) -> Progress:
   """Trains in a run's folder: a new one, or on from its last good checkpoint.
 
-  Returns:
-    How far it came; not complete if it was stopped.
-
   Raises:
     UserError: bad input; nothing was written, and no folder is left behind.
   """
@@ -72,11 +69,7 @@ def _with_newer_fields(stored: dict[str, Any]) -> dict[str, Any]:
 
 
 def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
-  """Takes over what `transfer_from` and `init_from` name.
-
-  Raises:
-    ValueError: the other folder cannot be used for this run.
-  """
+  """Takes over what `transfer_from` and `init_from` name."""
   if not (config.transfer_from or config.init_from):
     return
   if not isinstance(agent, LfgpAgent) or replay is None:

@@ -83,11 +83,7 @@ def widths(environment: dm_env.Environment) -> tuple[int, int]:
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
-  """Each task's reward of this step.
-
-  Args:
-    timestep: any step but the first of an episode.
-    tasks: K names.
+  """Each task's reward of a step that is not an episode's first.
 
   Returns:
     float32 [K]: the observable `reward/<task>`, or without one the

@@ -66,11 +66,7 @@ def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
 
 
 def success_table(rows: Sequence[EvaluationRow]) -> str:
-  """A plain-text table: success, episodes, mean steps and return per task.
-
-  Args:
-    rows: of one evaluation; pass those of one `env_step`.
-  """
+  """A table of one evaluation: success, episodes, mean steps, mean return."""
   rates = success_rates(rows)
   width = max([16, *(len(task) + 2 for task in rates)])
   lines = [

@@ -27,9 +27,6 @@ def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
     data: of one task, with its attributes.
     dataset_id: Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
 
-  Returns:
-    The dataset.
-
   Raises:
     ValueError: the id is taken or no id, or an episode's rows do not follow
       from one another.
@@ -65,9 +62,6 @@ def from_minari(
     dataset_id: Minari's name.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed` and
       `control_hz`, over those that `to_minari` stored.
-
-  Returns:
-    Its pairs; episodes are numbered from 0.
 
   Raises:
     ValueError: there is no such dataset, or its observations or actions are

@@ -22,8 +22,8 @@ def row(
     play: a function of seed and look, and the limits of `recorder.record`.
     task: the task to succeed in.
     seeds: of the episodes to try, in this order.
-    look: how frames are made.
-    columns: frames in the row.
+    look: of the frames.
+    columns: number of frames.
 
   Returns:
     The frames, uint8 [height, width, 3]; the seed and the control step of the

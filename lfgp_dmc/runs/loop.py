@@ -42,9 +42,9 @@ class EpisodeRounds(Rounds[ActingAgent]):
         start fixed by `seed` and the episode's number.
       agent: acts and learns; it samples from `replay` by itself.
       replay: where transitions go; with rewards if it keeps them.
-      schedule: see `Rounds`, like `log` and `progress`.
-      log: as above.
-      progress: as above.
+      schedule: when things happen.
+      log: gets a row each `log_every` steps and a last one.
+      progress: of the checkpoint that is being resumed.
       seed: of the episodes' starts and the random actions.
     """
     super().__init__(agent, schedule, log, progress)

@@ -14,13 +14,7 @@ _ITEMS = "__items__"  # a dict whose keys are not all text
 
 
 def pack(state: Any) -> tuple[dict[str, np.ndarray], Any]:
-  """Splits a nested state.
-
-  Args:
-    state: dicts, lists and tuples of arrays, numbers, text, booleans, None.
-
-  Returns:
-    The arrays by flat name, and the JSON-able tree.
+  """Splits a nested state into the arrays by flat name and the JSON tree.
 
   Raises:
     TypeError: a leaf of another type; the message says where.

@@ -44,7 +44,7 @@ class Run:
       agent: freshly built.
       environment: of an acting agent, like `replay` and `seed`.
       replay: opened from the folder.
-      schedule: see `Rounds`.
+      schedule: when things happen.
       evaluate: env_step -> episodes of the policy that the folder holds.
       config: the content of `config.json`.
       seed: of the episodes' starts.
@@ -82,9 +82,7 @@ class Run:
 
     The CSV files are cut back to it. A replay that lost the checkpoint's rows
     is emptied, with a warning, and the loop refills it before it updates again.
-
-    Returns:
-      Whether there was one.
+    Returns whether there was a checkpoint.
 
     Raises:
       CheckpointError: there are checkpoints, all damaged; nothing was changed.

@@ -60,11 +60,7 @@ def default_path(
 
 
 def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
-  """Makes a new run's folder, writes its config, and locks it.
-
-  Args:
-    path: the folder to make; its parents are made too.
-    config: the resolved config, JSON-able.
+  """Makes a new run's folder, and its parents, writes its config, locks it.
 
   Raises:
     ValueError: the folder exists.
@@ -90,8 +86,8 @@ def resume(
   """Opens an existing run's folder and locks it.
 
   Args:
-    path: the run's folder.
-    config: the resolved config of the command; it must equal the run's own.
+    path: of the run.
+    config: of the command; it must equal the run's own.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
