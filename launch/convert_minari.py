@@ -42,7 +42,10 @@ def main() -> None:
   folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"
   with command.checked_input():
     if not _BACK.value:
-      for path in _files(folder):
+      paths = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
+      if not paths:
+        raise UserError(f"no dataset in {folder}")
+      for path in paths:
         name = f"{prefix}{path.stem}-v0"
         minari_datasets.to_minari(demonstrations.read(path), name)
         print(name)
@@ -59,13 +62,6 @@ def main() -> None:
       path = folder / (task + demonstrations.SUFFIX)
       demonstrations.write(path, data, {"task": task, **data.attributes})
       print(path)
-
-
-def _files(folder: pathlib.Path) -> list[pathlib.Path]:
-  found = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
-  if not found:
-    raise UserError(f"no dataset in {folder}")
-  return found
 
 
 def _attributes() -> dict[str, str | int]:

@@ -28,21 +28,22 @@ def load(
       "config.demonstrations is not set: give the dataset's folder, see "
       "launch/collect_demonstrations.py"
     )
+  from lfgp_dmc.tasks import mirror, published_examples
+
   folder = pathlib.Path(config.demonstrations)
   if not folder.exists():
     _collect(config)
   try:
-    found = _read(folder, tasks, widths)
+    if published_examples.is_folder_of_examples(folder):
+      found = published_examples.read_folder(folder, tasks)
+    else:
+      found = demonstrations.read_folder(folder, tasks, *widths)
     _check_rate(config, found)
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
-  if config.mirror_demonstrations:
-    from lfgp_dmc.tasks import mirror
-
-    found = mirror.with_images(found)
-  return found
+  return mirror.with_images(found) if config.mirror_demonstrations else found
 
 
 def _counted(
@@ -64,17 +65,6 @@ def _counted(
   return {
     task: data.head(config.pairs_per_task) for task, data in found.items()
   }
-
-
-def _read(
-  folder: pathlib.Path, tasks: Sequence[str], widths: tuple[int, int]
-) -> dict[str, Demonstrations]:
-  """Reads our own files, or a folder of published examples of success."""
-  from lfgp_dmc.tasks import published_examples
-
-  if published_examples.is_folder_of_examples(folder):
-    return published_examples.read_folder(folder, tasks)
-  return demonstrations.read_folder(folder, tasks, *widths)
 
 
 def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:

@@ -6,7 +6,6 @@ or torch only when it is called.
 
 import dataclasses
 import functools
-import os
 import pathlib
 from collections.abc import Callable
 from typing import Any
@@ -78,14 +77,10 @@ def find(
     return PolicySpec(
       make, "scripted expert", EnvironmentSpec(task, "", control_hz), tasks
     )
-  return _of_folder(run or str(expert))
-
-
-def _of_folder(folder: str) -> PolicySpec:
-  path = pathlib.Path(folder)
+  path = pathlib.Path(run or str(expert))
   try:
     config = run_folder.read_config(path)
-    policy: Any = stored_policy(folder)
+    policy: Any = stored_policy(str(path))
     main_task = config.get("main_task", policy.tasks[0])
     spec = EnvironmentSpec(
       main_task, config.get("environment", ""), config.get("control_hz", 20)
@@ -94,7 +89,7 @@ def _of_folder(folder: str) -> PolicySpec:
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
   return PolicySpec(
-    functools.partial(stored_policy, os.fspath(path)),
+    functools.partial(stored_policy, str(path)),
     path.name,
     spec,
     (main_task, *(t for t in policy.tasks if t != main_task)),

@@ -12,6 +12,7 @@ from lfgp_dmc import observations, task_names
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.lfgp.config import PretrainingConfig
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.benchmarks.operations import gflop_of_update
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
@@ -48,7 +49,7 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     torch.set_num_threads(threads)
     for name, dtype in _DTYPES.items():
       suffix = f"{name}_{threads}thread{'s' if threads > 1 else ''}"
-      agent = make_agent(config, bfloat16=name == "bf16")
+      agent = make_agent(dataclasses.replace(config, bfloat16=name == "bf16"))
       rounds = [
         (rate(agent.update, seconds / _ROUNDS), best_matmul_rate(dtype))
         for _ in range(_ROUNDS)
@@ -83,14 +84,8 @@ def tasks_of(config: RunConfig) -> tuple[str, ...]:
   return (config.main_task,)
 
 
-def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
-  """The config's agent, without pretraining, on made-up data.
-
-  Args:
-    config: of a run.
-    replay: of its transitions; None makes some up.
-    bfloat16: overrides the config's.
-  """
+def make_agent(config: RunConfig, replay: Replay | None = None):
+  """The config's agent, without pretraining; data that lack are made up."""
   tasks = tasks_of(config)
   assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   size = observations.OBSERVATION_SIZE
@@ -107,7 +102,7 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
     torch.device("cpu"),
     size,
     _ACTION_SIZE,
-    bfloat16=config.bfloat16 if bfloat16 is None else bfloat16,
+    bfloat16=config.bfloat16,
   )
 
 

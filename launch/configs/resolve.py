@@ -2,7 +2,7 @@
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import ml_collections
@@ -14,6 +14,7 @@ from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.launch.configs.algorithms import ALGORITHMS
 from lfgp_dmc.launch.configs.presets import OF_TASK, PRESETS
 from lfgp_dmc.launch.configs.run_config import RunConfig
+from lfgp_dmc.runs.pytree import flattened
 
 KIND = ".kind"  # the end of names of fields that choose a group's class
 
@@ -135,17 +136,6 @@ def fill(path: Any, config: Mapping[str, Any]) -> Any:
       f"{', '.join(SOURCE_TASKS)}"
     )
   return path.replace("{source_task}", SOURCE_TASKS.get(task, ""))
-
-
-def flattened(
-  values: Mapping[str, Any], prefix: str = ""
-) -> Iterator[tuple[str, Any]]:
-  """Dotted names and values of all leaves."""
-  for name, value in values.items():
-    if isinstance(value, Mapping):
-      yield from flattened(value, f"{prefix}{name}.")
-    else:
-      yield prefix + name, value
 
 
 def hint(name: str, known: Iterable[str], prefix: str = "config.") -> str:

@@ -70,16 +70,13 @@ def reseeded(
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
   """The sizes (O, A) of flat observations and of actions."""
-  spec = environment.observation_spec()
-  flatten = flattener(environment)
+  spec: Any = environment.observation_spec()
   if isinstance(spec, Mapping):
-    example: Any = {
-      name: np.zeros(part.shape, part.dtype) for name, part in spec.items()
-    }
+    example: Any = {name: np.zeros(part.shape) for name, part in spec.items()}
   else:
-    example = np.zeros(spec.shape, spec.dtype)
+    example = np.zeros(spec.shape)
   action_size = int(np.prod(environment.action_spec().shape))
-  return len(flatten(example)), action_size
+  return len(flattener(environment)(example)), action_size
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:

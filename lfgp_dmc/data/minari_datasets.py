@@ -81,9 +81,13 @@ def from_minari(
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")
+  pairs = [
+    (one.observations[:-1], one.actions, one.observations[1:])
+    for one in episodes
+  ]
   observation, action, after = (
     np.concatenate(parts).astype(np.float32)
-    for parts in zip(*map(_pairs, episodes), strict=True)
+    for parts in zip(*pairs, strict=True)
   )
   lengths = [len(one.actions) for one in episodes]
   return Demonstrations(
@@ -114,10 +118,6 @@ def _buffer(data: Demonstrations, rows: slice) -> EpisodeBuffer:
     terminations=terminations,
     truncations=truncations,
   )
-
-
-def _pairs(episode) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-  return episode.observations[:-1], episode.actions, episode.observations[1:]
 
 
 def _success(episode) -> np.ndarray:

@@ -4,7 +4,7 @@ Arrays go to one flat dict under names like `critic/optimizer/0`; in the tree
 `{"__array__": name}` keeps their place. Tuples come back as lists.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,17 @@ def unpack(arrays: Mapping[str, np.ndarray], tree: Any) -> Any:
   if tree.keys() == {_ITEMS}:
     return {key: unpack(arrays, value) for key, value in tree[_ITEMS]}
   return {key: unpack(arrays, value) for key, value in tree.items()}
+
+
+def flattened(
+  values: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+  """Dotted names and values of all leaves, such as of a config."""
+  for name, value in values.items():
+    if isinstance(value, Mapping):
+      yield from flattened(value, f"{prefix}{name}.")
+    else:
+      yield prefix + name, value
 
 
 def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:
