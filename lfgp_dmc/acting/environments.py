@@ -80,11 +80,9 @@ def widths(environment: dm_env.Environment) -> tuple[int, int]:
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
-  """Each task's reward of a step that is not an episode's first.
+  """Each task's reward of a step that is not an episode's first, float32 [K].
 
-  Returns:
-    float32 [K]: the observable `reward/<task>`, or without one the
-    environment's own reward.
+  It is the observable `reward/<task>`, or else the environment's own reward.
   """
   own = 0.0 if timestep.reward is None else float(timestep.reward)
   observed = timestep.observation

@@ -140,10 +140,7 @@ def read_folder(
   observation_size: int | None = None,
   action_size: int | None = None,
 ) -> dict[str, Demonstrations]:
-  """Reads the files of several tasks; see `read`.
-
-  Returns:
-    Task -> its demonstrations, in the order of `tasks`.
+  """Reads the files of several tasks, in their order; see `read`.
 
   Raises:
     DatasetError: one line a faulty file, damaged files before missing ones.

@@ -23,9 +23,7 @@ _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
 def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
   """Stores one task's demonstrations as a local Minari dataset.
 
-  Args:
-    data: of one task, with its attributes.
-    dataset_id: Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
+  The id is Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
 
   Raises:
     ValueError: the id is taken or no id, or an episode's rows do not follow
