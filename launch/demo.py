@@ -103,7 +103,6 @@ def _columns(
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
   rows = evaluation_csv.read_csv(path / "evaluation.csv")
-  last = max(row.env_step for row in rows)
   tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
@@ -112,7 +111,7 @@ def _columns(
   columns = {
     "untrained": untrained,
     "warm start": [row for row in rows if row.env_step == 0],
-    "trained": [row for row in rows if row.env_step == last],
+    "trained": evaluation_csv.newest(rows),
   }
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]

@@ -6,10 +6,9 @@ A run is named after its flagfile, main task and seed: `lfgp_stack_0` is
 
 import csv
 import dataclasses
+import math
 import pathlib
 from collections.abc import Iterable, Sequence
-
-import numpy as np
 
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.runs import run_folder
@@ -185,15 +184,12 @@ def _is_done(folder: pathlib.Path) -> bool:
 def _last_success(folder: pathlib.Path) -> tuple[str, str]:
   """The last evaluation of the main task: its step, and share of successes."""
   try:
-    main_task = run_folder.read_config(folder).get("main_task")
+    main_task = str(run_folder.read_config(folder).get("main_task"))
     rows = evaluation_csv.read_csv(folder / "evaluation.csv")
   except (OSError, ValueError, csv.Error):
     return "", ""
-  rows = [row for row in rows if row.task == main_task]
+  rows = evaluation_csv.newest(row for row in rows if row.task == main_task)
   if not rows:
     return "", ""
-  last = max(row.env_step for row in rows)
-  known = [
-    r.success for r in rows if r.env_step == last and r.success is not None
-  ]
-  return str(last), f"{np.mean(known):.3f}" if known else ""
+  rate = evaluation_csv.success_rates(rows)[main_task]
+  return str(rows[0].env_step), "" if math.isnan(rate) else f"{rate:.3f}"

@@ -54,10 +54,7 @@ def report(
   is_supervised = configs.ALGORITHMS[config.algorithm].is_supervised
   unit = "updates" if is_supervised else "environment steps"
   print(f"\nsuccess after {progress.env_step} {unit}:")
-  last = max(row.env_step for row in rows)
-  print(
-    evaluation_csv.success_table([row for row in rows if row.env_step == last])
-  )
+  print(evaluation_csv.success_table(evaluation_csv.newest(rows)))
   print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")
   print(f"evaluation   {path / 'evaluation.csv'}")
   print(f"policy       {path / 'policy.safetensors'}")
