@@ -94,7 +94,7 @@ class TrainingTest(fixtures.RunTest):
       rounds.return_value.run.return_value = Progress()
       self.train(self.config(pairs_per_task=20))
     agent = rounds.call_args.args[1]
-    self.assertEqual(agent._experts._sizes.tolist(), [20, 20])
+    self.assertEqual(agent._experts._all.sizes.tolist(), [20, 20])
 
   def test_a_smaller_replay_resumes_too(self):
     config = self.config(replay_capacity=60, env_steps=120)
