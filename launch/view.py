@@ -7,6 +7,8 @@
 Without --run or --expert the arm holds still, to be looked at and pushed.
 """
 
+import functools
+
 import numpy as np
 from absl import flags
 
@@ -20,7 +22,9 @@ _TASK = flags.DEFINE_string(
   "task", "", "The task to look at; with --run, the intention that acts."
 )
 _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
-_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_EXPERT = flags.DEFINE_enum(
+  "expert", None, [policies.SCRIPTED], "Instead of --run."
+)
 _SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
 
 
@@ -29,8 +33,6 @@ def main() -> None:
   task, spec = _TASK.value, None
   if task and not _RUN.value:
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
-  if _EXPERT.value:
-    command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   if _RUN.value or _EXPERT.value:
     spec = policies.find(_RUN.value, _EXPERT.value, task)
     task = command.check_choice("task", task or spec.main_task, spec.tasks)
@@ -45,8 +47,8 @@ def main() -> None:
 def _open(spec: policies.PolicySpec | None, task: str) -> None:
   from dm_control import viewer
 
-  world = spec.world if spec else EnvironmentSpec(task)
-  environment = world.build(seed=_SEED.value)
+  where = spec.environment_spec if spec else EnvironmentSpec(task)
+  environment = where.build(seed=_SEED.value)
   policy = None
   if spec:
     actor, flatten = spec.make(), environments.flattener(environment)
@@ -61,5 +63,7 @@ def _open(spec: policies.PolicySpec | None, task: str) -> None:
   viewer.launch(environment, policy, title=f"LfGP-DMC: {task}")
 
 
+cli = functools.partial(command.run, main, window=True)
+
 if __name__ == "__main__":
-  command.run(main, window=True)
+  cli()

@@ -15,7 +15,7 @@ class AgentContractTest(parameterized.TestCase):
   def test_has_every_member_with_its_signature(self, name):
     algorithm, tasks = configs.ALGORITHMS[name], task_names.task_set("stack")
     agent = algorithm.build(
-      configs.to_run_config(configs.make_config(name)).agent,
+      configs.from_dict(configs.make_config(name).to_dict()).agent,
       tasks,
       synthetic.demonstrations(tasks, 60, 3, 2),
       Replay(4, 3, 2, reward_tasks=tasks),

@@ -171,8 +171,8 @@ class ConfigTest(parameterized.TestCase):
   @parameterized.parameters(*configs.PRESETS)
   def test_no_preset_makes_sacx_need_demonstrations(self, preset):
     config = resolve("--config.algorithm=sacx", f"--preset={preset}")
-    self.assertFalse(config.uses_demonstrations)
-    self.assertTrue(config.keeps_rewards)
+    self.assertFalse(config.agent.uses_demonstrations)
+    self.assertTrue(config.agent.keeps_rewards)
 
 
 class FlagfilesTest(parameterized.TestCase):
@@ -182,7 +182,9 @@ class FlagfilesTest(parameterized.TestCase):
       config = resolve(
         f"--flagfile={_FLAGS / name}", f"--config.main_task={task}"
       )
-      self.assertEqual(config.uses_demonstrations, bool(config.demonstrations))
+      self.assertEqual(
+        config.agent.uses_demonstrations, bool(config.demonstrations)
+      )
       if name != "quickstart.flags" and config.demonstrations:
         self.assertStartsWith(config.demonstrations, f"data/{task}_")
 

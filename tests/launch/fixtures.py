@@ -108,7 +108,7 @@ def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   known = dict(configs.flattened(config.to_dict()))
   small = {name: value for name, value in small.items() if name in known}
   config.update_from_flattened_dict({**small, **changes})
-  return configs.to_run_config(config)
+  return configs.from_dict(config.to_dict())
 
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")

@@ -8,7 +8,7 @@ from absl.testing import absltest, parameterized
 import lfgp_dmc
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.runs import loop, run_folder
+from lfgp_dmc.runs import run, run_folder
 from lfgp_dmc.runs.schedule import Progress
 from tests.launch import fixtures
 
@@ -90,11 +90,11 @@ class TrainingTest(fixtures.RunTest):
       self.train(config)
 
   def test_uses_the_first_pairs_alone(self):
-    with mock.patch.object(loop, "train") as train:
-      train.return_value = Progress()
+    with mock.patch.object(run, "EpisodeRounds") as rounds:
+      rounds.return_value.run.return_value = Progress()
       self.train(self.config(pairs_per_task=20))
-    agent = train.call_args.args[1]
-    self.assertEqual(agent._experts._sizes.tolist(), [20, 20])
+    agent = rounds.call_args.args[1]
+    self.assertEqual(agent._experts._all.sizes.tolist(), [20, 20])
 
   def test_a_smaller_replay_resumes_too(self):
     config = self.config(replay_capacity=60, env_steps=120)

@@ -90,9 +90,11 @@ class SacxTest(_RunTest):
       self.train(self.config("sacx", **config), "a")
 
   def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
-    config = configs.to_run_config(configs.make_config("sacx"))
-    environment = config.world.build(config.keeps_rewards)
-    shown = environments.tasks_with_rewards(environment, ("stack", "reach"))
+    config = configs.from_dict(configs.make_config("sacx").to_dict())
+    environment = config.environment_spec.build(config.agent.keeps_rewards)
+    shown = environments.with_observed_tasks(
+      environment, ("stack", "reach"), "reward/"
+    )
     self.assertEqual(shown[:2], ("stack", "reach"))
     self.assertCountEqual(shown, task_names.ALL_TASKS)
 

@@ -57,15 +57,17 @@ class LoopTest(fixtures.FolderTest):
       "progress_bar": False,
     } | schedule
     self._replay = Replay(1000, 2, 2, reward_tasks=toy.TASKS)
-    return loop.train(
+    rounds = loop.EpisodeRounds(
       environment or toy.PointEnvironment(),
       agent,
       self._replay,
       TrainSchedule(**options),
       MetricsLog(self.folder),
+      progress,
+    )
+    return rounds.run(
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.update)),
-      progress=progress,
     )
 
   def _rows(self):

@@ -53,13 +53,10 @@ class SupervisedTest(fixtures.FolderTest):
       "checkpoint_every": 35,
       "progress_bar": False,
     } | schedule
-    return supervised.train(
-      agent,
-      TrainSchedule(**options),
-      MetricsLog(self.folder),
+    schedule, log = TrainSchedule(**options), MetricsLog(self.folder)
+    return supervised.EpochRounds(agent, schedule, log, progress).run(
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.is_complete)),
-      progress=progress,
     )
 
   def _steps(self):
