@@ -205,7 +205,3 @@ class ContractTest(parameterized.TestCase):
     shown = fixtures.demonstrations()
     with self.assertRaisesRegex(ValueError, "the environment has \\(3, 2\\)"):
       build(BcConfig(), TASKS, shown, None, 0, "cpu", 3, A)
-
-
-if __name__ == "__main__":
-  absltest.main()

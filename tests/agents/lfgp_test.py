@@ -244,7 +244,3 @@ class DeterminismTest(parameterized.TestCase):
     before = state["heads.output.bias"].copy()
     agent.update()
     np.testing.assert_array_equal(state["heads.output.bias"], before)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -212,7 +212,3 @@ class StandardiserTest(absltest.TestCase):
       result, torch.tensor([[0.002, -1.0, 0.197375, -1.0]])
     )
     self.assertEqual(standardiser.input_size, 4)
-
-
-if __name__ == "__main__":
-  absltest.main()

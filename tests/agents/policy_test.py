@@ -163,7 +163,3 @@ class FolderTest(parameterized.TestCase):
     del options["layout"]
     loaded = Policy.from_arrays(policy.arrays(), options)
     np.testing.assert_array_equal(loaded.act(row), policy.act(row))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -219,7 +219,3 @@ def _distance(agent, shown):
     for task, data in shown.items()
   ]
   return float(np.sqrt(np.mean(squares)))
-
-
-if __name__ == "__main__":
-  absltest.main()

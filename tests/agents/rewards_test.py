@@ -231,7 +231,3 @@ class ExamplesTest(absltest.TestCase):
     shown = fixtures.demonstrations(pairs=10, attempt=50)
     with self.assertRaisesRegex(ValueError, r"is_last.*stack"):
       make_agent(shown=shown, **_EXAMPLES)
-
-
-if __name__ == "__main__":
-  absltest.main()

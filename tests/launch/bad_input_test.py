@@ -65,7 +65,3 @@ class BadInputTest(absltest.TestCase):
           self.assertNotIn("Traceback", done.stderr)
     self.assertEqual(os.listdir(folder), ["old"])
     self.assertEmpty(os.listdir(folder / "old"))
-
-
-if __name__ == "__main__":
-  absltest.main()

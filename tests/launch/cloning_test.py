@@ -3,7 +3,7 @@
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 import lfgp_dmc
 from lfgp_dmc.agents.bc import BcAgent
@@ -107,7 +107,3 @@ class DacRunTest(fixtures.RunTest):
     self.assertEqual({row.task for row in rows}, {"right"})
     act = lfgp_dmc.load_policy(run)
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
-
-
-if __name__ == "__main__":
-  absltest.main()

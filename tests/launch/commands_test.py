@@ -187,7 +187,3 @@ def _names(done: subprocess.CompletedProcess) -> list[str]:
   for line in done.stdout.splitlines():
     float(line.partition("=")[2])
   return [line.partition("=")[0] for line in done.stdout.splitlines()]
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,7 @@ import json
 import pathlib
 
 from absl import flags
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.launch import config_flags, configs
@@ -207,7 +207,3 @@ class FlagfilesTest(parameterized.TestCase):
     config = resolve(f"--flagfile={path}", task, "--config.transfer_from=")
     self.assertEqual(config.agent.scheduler.kind, "conditional_weighted")
     self.assertEqual(config.transfer_from, "")
-
-
-if __name__ == "__main__":
-  absltest.main()

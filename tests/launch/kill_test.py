@@ -70,7 +70,3 @@ class KillTest(absltest.TestCase):
     self.assertEqual(
       fixtures.numbers(folder / "killed"), fixtures.numbers(folder / "whole")
     )
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -158,7 +158,3 @@ class OwnArraysTest(absltest.TestCase):
     exec(code, arrays)
     found = demonstrations.read_folder(folder, ["stack"], 59, 4)
     self.assertLen(found["stack"], 5)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -63,7 +63,3 @@ class SweepCommandTest(absltest.TestCase):
       self.assertEqual(done.returncode, 1)
       self.assertIn(message, done.stderr)
       self.assertNotIn("Traceback", done.stderr)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -178,7 +178,3 @@ def _processes(argument: str) -> dict[int, int]:
     if argument in arguments:
       found[int(process.name)] = int(stat.split()[1])
   return found
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -153,7 +153,3 @@ class SweepTest(absltest.TestCase):
     self.assertIn("--resume", again[0].train_arguments())
     row = csv_files.read(index)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
-
-
-if __name__ == "__main__":
-  absltest.main()

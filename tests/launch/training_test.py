@@ -3,7 +3,7 @@
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 import lfgp_dmc
 from lfgp_dmc.data import evaluation_csv
@@ -100,7 +100,3 @@ class TrainingTest(fixtures.RunTest):
     config = self.config(replay_capacity=60, env_steps=120)
     self.train(config)
     self.train(config, resume=True)
-
-
-if __name__ == "__main__":
-  absltest.main()

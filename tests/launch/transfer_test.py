@@ -4,7 +4,6 @@ import shutil
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
@@ -229,7 +228,3 @@ class ExamplesTest(_RunTest):
     (*_, last) = fixtures.rows(path / "metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
     self.train(config, "a", resume=True)
-
-
-if __name__ == "__main__":
-  absltest.main()

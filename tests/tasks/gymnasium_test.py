@@ -5,7 +5,7 @@ import unittest
 import warnings
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 import lfgp_dmc
 from lfgp_dmc import graphics
@@ -125,7 +125,3 @@ class GymnasiumTest(parameterized.TestCase):
       *_, info = envs.step(envs.action_space.sample())
     self.assertEqual(info["is_success"].shape, (2,))
     envs.close()
-
-
-if __name__ == "__main__":
-  absltest.main()

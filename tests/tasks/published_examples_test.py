@@ -3,7 +3,7 @@
 import pathlib
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.tasks import published_examples
@@ -73,7 +73,3 @@ class PublishedExamplesTest(parameterized.TestCase):
       observed = env.step([0.0, 0.0, 0.0, action[3]]).observation
       holding.append(bool(observed[f"condition/{task}"]))
     self.assertGreaterEqual(np.mean(holding), 0.98)
-
-
-if __name__ == "__main__":
-  absltest.main()

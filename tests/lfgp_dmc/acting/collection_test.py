@@ -240,7 +240,3 @@ class _Long(_PlayPoint):
     names = LeadTest._TASKS
     timestep.observation.update({f"success/{name}": done for name in names})
     return timestep
-
-
-if __name__ == "__main__":
-  absltest.main()

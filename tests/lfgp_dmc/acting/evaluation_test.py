@@ -109,7 +109,3 @@ class EnvironmentsTest(absltest.TestCase):
     rewards = environments.task_rewards(timestep, ("right", "left", "other"))
     self.assertEqual(rewards[2], rewards[0])
     self.assertAlmostEqual(float(rewards[0] + rewards[1]), 0.4, places=5)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -9,7 +9,6 @@ import unittest
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import command
@@ -105,7 +104,3 @@ class MinariTest(fixtures.FolderTest):
     self.assertLen(back, 11)
     self.assertEqual((back.attributes["expert"], back.attributes["seed"]),
                      ("me", 9))  # fmt: skip
-
-
-if __name__ == "__main__":
-  absltest.main()

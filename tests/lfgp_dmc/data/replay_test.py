@@ -3,7 +3,7 @@
 import json
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
@@ -208,7 +208,3 @@ class MappedReplayTest(fixtures.FolderTest):
     (self._folder / "replay.json").write_text('{"size": 4}')
     with self.assertRaisesRegex(ValueError, "replay.json is damaged"):
       Replay.stored(self._folder)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -79,7 +79,3 @@ class FilmStripTest(absltest.TestCase):
     self.assertEqual(found, ([0, 8, 16, 24], 7, 12))
     with self.assertRaisesRegex(ValueError, "no success of lift in 2 episodes"):
       film_strips.row(play, "lift", range(2), Look(), 4)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -5,7 +5,6 @@ import shutil
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
@@ -179,7 +178,3 @@ class ResumingTest(fixtures.FolderTest):
   def test_a_finished_run_resumes_to_nothing(self):
     self._run(self.folder / "whole", resume=True)
     self.assertEqual(self._numbers(self.folder / "whole"), self._whole)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -173,7 +173,3 @@ class StudyTest(parameterized.TestCase):
     run = run_results.Run("dac", "swing", 0, self.folder, [row])
     with self.assertRaisesRegex(ValueError, "no success in the evaluations of"):
       figures.learning_curve([run], self.folder / "a.png")
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,7 @@ import functools
 import pickle
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import flatten, seeding
 from lfgp_dmc.task_names import ALL_TASKS
@@ -147,7 +147,3 @@ class PlayStatesTest(parameterized.TestCase):
   def _check(self, task, **start):
     env = environment()
     self.assertTrue(_run(env, task, env.reset_to(**start))[0])
-
-
-if __name__ == "__main__":
-  absltest.main()
