@@ -2,11 +2,9 @@
 
 import os
 import pathlib
-from concurrent import futures
 
 from absl.testing import absltest
 
-from lfgp_dmc.launch import command
 from tests.launch import fixtures
 
 # Script, arguments, what the message says.
@@ -56,12 +54,11 @@ class BadInputTest(absltest.TestCase):
     cases = [*_BAD]
     for line, message in _BAD_COLLECTION:
       cases.append((f"collect_demonstrations.py {line}", message))
-    with futures.ThreadPoolExecutor(command.cores()) as pool:
-      calls = pool.map(lambda case: fixtures.call(case[0], folder), cases)
-      for (line, message), done in zip(cases, calls, strict=True):
-        with self.subTest(line):
-          self.assertEqual(done.returncode, 1, done.stderr)
-          self.assertIn(message, done.stderr)
-          self.assertNotIn("Traceback", done.stderr)
+    for line, message in cases:
+      with self.subTest(line):
+        done = fixtures.call(line, folder)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn(message, done.stderr)
+        self.assertNotIn("Traceback", done.stderr)
     self.assertEqual(os.listdir(folder), ["old"])
     self.assertEmpty(os.listdir(folder / "old"))

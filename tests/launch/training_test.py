@@ -6,7 +6,7 @@ import numpy as np
 from absl.testing import parameterized
 
 import lfgp_dmc
-from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import loop, run_folder
 from lfgp_dmc.runs.schedule import Progress
@@ -93,10 +93,12 @@ class TrainingTest(fixtures.RunTest):
     with mock.patch.object(loop, "train") as train:
       train.return_value = Progress()
       self.train(self.config(pairs_per_task=20))
-    agent = train.call_args.args[1]
-    self.assertEqual(agent._experts._sizes.tolist(), [20, 20])
+    found = train.call_args.args[1]._experts._observation
+    shown = [
+      demonstrations.read(self.dataset / f"{task}.hdf5").observation[:20]
+      for task in ("right", "left")
+    ]
+    np.testing.assert_array_equal(found, np.concatenate(shown))
 
   def test_a_smaller_replay_resumes_too(self):
-    config = self.config(replay_capacity=60, env_steps=120)
-    self.train(config)
-    self.train(config, resume=True)
+    self.check_resume(self.config(replay_capacity=60, env_steps=120))

@@ -202,9 +202,15 @@ class InitFromTest(_RunTest):
     config = self.config(
       init_from=str(bare), **{"agent.networks.actor_trunk": "own"}
     )
-    with mock.patch.object(Run, "train") as train:
-      train.return_value = None
+    rows, acts = np.eye(2, dtype=np.float32), []
+
+    def look(run):
+      acts.append(run.agent.policy.act(rows, "left"))
+
+    with mock.patch.object(Run, "train", look):
       self.train(config, "a")
+    expected = Policy.load(source).act(rows, "left")
+    np.testing.assert_array_equal(acts, [expected])
     self.train(config, "a", resume=True)  # was killed at once: starts again
     wrong = self.config(
       init_from=str(self.folder / "data"),
@@ -215,7 +221,7 @@ class InitFromTest(_RunTest):
 
 
 class ExamplesTest(_RunTest):
-  def test_learns_from_rows_of_success(self):
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     config = self.config(
       **{
         "agent.reward.kind": "examples",
@@ -224,7 +230,6 @@ class ExamplesTest(_RunTest):
         "agent.reward.scale": 0.1,
       }
     )
-    path, _ = self.train(config, "a")
-    (*_, last) = fixtures.rows(path / "metrics.csv")
+    self.check_resume(config)
+    (*_, last) = fixtures.rows(self.folder / "runs/whole/metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
-    self.train(config, "a", resume=True)
