@@ -28,7 +28,8 @@ class DemoTest(absltest.TestCase):
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
       "--config.agent.pretraining.updates=5",
-      str(folder),
+      folder,
+      fresh=True,
     )
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(
