@@ -54,7 +54,11 @@ class CloningTest(fixtures.RunTest):
     self.assertEqual(fixtures.numbers(whole), before)
 
   def test_loses_at_most_what_came_after_its_last_checkpoint(self):
-    changes = {"agent.overfit_tolerance": 20, "log_every": 7}
+    changes = {
+      "agent.overfit_tolerance": 20,
+      "env_steps": 150,
+      "log_every": 7,
+    }
     config = self.config("bc", checkpoint_every=30, **changes)
     one, whole = self.train(config, "one")
     real, updates = BcAgent.update, []

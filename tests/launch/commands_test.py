@@ -23,7 +23,7 @@ class DemoTest(absltest.TestCase):
     stored = _ROOT / "results" / "policies" / "stack"
     done = fixtures.call(
       f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
-      f"--stored={stored} "
+      f"--stored={stored} --config.main_task=open_gripper "
       "--config.collect_pairs=40 --config.env_steps=360 "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
@@ -34,7 +34,7 @@ class DemoTest(absltest.TestCase):
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(
       done.stdout,
-      r"task +untrained +warm start +trained +stored +expert\nstack",
+      r"task +untrained +warm start +trained +stored +expert\nopen_gripper",
     )
     self.assertIn("total time", done.stdout)
     self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
@@ -147,11 +147,14 @@ class BlockRunTest(absltest.TestCase):
     self.assertNotIn("GLFW", done.stderr)
 
   def test_benchmarks_print_the_agreed_lines(self):
-    small = "--config.agent.networks.hidden_size=16"
+    small = (
+      "--config.agent.networks.hidden_size=16 --config.agent.batch_size=8 "
+      "--config.agent.reward.batch_size=8"
+    )
     lines = (
       "environment --steps=50",
       "stability --steps=50 --tasks=reach",
-      f"training --steps=3 {small}",
+      f"training --steps=3 --seconds=0 {small}",
       f"learner --seconds=0 {small}",
       f"memory --steps=3 {small} --config.replay_capacity=2000",
     )

@@ -31,19 +31,20 @@ class TrainingTest(fixtures.RunTest):
     self.check_resume(self.config(), checkpoints=2)
 
   def test_a_finished_run_resumes_to_nothing(self):
-    run, _ = self.train(self.config())
+    config = self.config(env_steps=60)
+    run, _ = self.train(config)
     before = (run / "metrics.csv").read_bytes()
-    _, progress = self.train(self.config(), resume=True)
-    self.assertEqual(progress.env_step, 200)
+    _, progress = self.train(config, resume=True)
+    self.assertEqual(progress.env_step, 60)
     self.assertEqual((run / "metrics.csv").read_bytes(), before)
 
   def test_another_config_is_not_resumed(self):
-    self.train(self.config())
-    changed = self.config(**{"agent.scheduler.xi": 10, "seed": 4})
+    self.train(self.config(env_steps=40))
+    changed = {"agent.scheduler.xi": 10, "env_steps": 40, "seed": 4}
     with self.assertRaisesRegex(
       UserError, r"seed \(0, now 4\); agent.scheduler.xi \(5, now 10\)"
     ):
-      self.train(changed, resume=True)
+      self.train(self.config(**changed), resume=True)
 
   def test_an_existing_folder_is_refused(self):
     run = self.folder / "runs" / "a"
