@@ -25,10 +25,17 @@ class _Seeded(toy.PointEnvironment):
   reseed = property()  # hasattr says no
 
 
+class _Steady(toy.WalkingActor):
+  """Walks alike in every episode."""
+
+  def begin(self, task, seed):
+    super().begin(task, 0)
+
+
 def _evaluate(make=toy.PointEnvironment, **options):
   return evaluation.evaluate(
     make,
-    toy.WalkingActor,
+    options.pop("make_actor", toy.WalkingActor),
     options.pop("tasks", toy.TASKS),
     episodes=3,
     seed=options.pop("seed", 7),
@@ -58,7 +65,13 @@ class EvaluateTest(absltest.TestCase):
   def test_an_episode_depends_on_seed_and_number_alone(self):
     both, left = _evaluate(), _evaluate(tasks=("left",))
     self.assertEqual(both[3:], left)
-    self.assertNotEqual(_evaluate(seed=8), both)
+
+  def test_resets_follow_the_seed(self):
+    returns = [
+      [row.episode_return for row in _evaluate(make_actor=_Steady, seed=seed)]
+      for seed in (7, 8)
+    ]
+    self.assertNotEqual(*returns)
 
   def test_environments_without_reseed_are_built_anew(self):
     rows = _evaluate(_Seeded)
