@@ -138,7 +138,6 @@ class EarlyStopTest(absltest.TestCase):
     self.assertFalse(agent.has_converged)
 
   def test_learns_and_converges_on_synthetic_data(self):
-    torch.set_num_threads(1)
     agent = make_bc(("stack",), overfit_tolerance=5)
     start = np.mean(agent.validation_losses())
     for _ in range(500):

@@ -42,10 +42,6 @@ def _step(agent, row):
 
 
 class LearningTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    torch.set_num_threads(1)
-
   @parameterized.parameters(
     (TASKS, {}),
     (TASKS, {"reward.main_masked": "0:2", "reward.input": "state"}),

@@ -175,7 +175,6 @@ class KeptSuccessTest(absltest.TestCase):
   """A thousand updates after pretraining: success is not lost."""
 
   def test_success_of_cloning_is_kept(self):
-    torch.set_num_threads(1)
     plan = CollectionPlan(
       lambda task: toy.PointEnvironment(),
       toy.WalkingActor,

@@ -86,7 +86,6 @@ class StoredRewardsTest(absltest.TestCase):
         make_agent(shown={}, replay=replay, **{"reward.kind": "stored"})
 
   def test_returns_rise(self):
-    torch.set_num_threads(1)
     agent, replay = fixtures.make_toy_agent(
       1,
       2000,

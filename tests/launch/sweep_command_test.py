@@ -1,20 +1,17 @@
 """The sweep command itself, on the toy environment."""
 
 import os
-import pathlib
 import signal
 import subprocess
 
-from absl.testing import absltest
-
 from lfgp_dmc.launch import command
+from tests.fixtures import FolderTest
 from tests.launch import sweep_fixtures
 
 
-class SweepCommandTest(absltest.TestCase):
+class SweepCommandTest(FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     sweep_fixtures.write_flagfiles(self.folder, lfgp=3000)
 
   def _start(self, *arguments) -> subprocess.Popen:

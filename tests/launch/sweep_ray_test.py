@@ -15,10 +15,9 @@ import signal
 import tempfile
 from unittest import mock
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch import command
+from tests.fixtures import FolderTest
 from tests.launch import sweep_fixtures
 
 _STEPS = {"lfgp_right": 1200, "lfgp_transfer_right": 200}
@@ -30,7 +29,7 @@ _VARIABLES = {
 _STORE = 80 * 2**20  # B; about the least that Ray takes
 
 
-class SweepRayTest(absltest.TestCase):
+class SweepRayTest(FolderTest):
   @classmethod
   def setUpClass(cls):
     super().setUpClass()
@@ -53,7 +52,6 @@ class SweepRayTest(absltest.TestCase):
 
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.runs = self.folder / "runs"
 
   def _start(self, *arguments):

@@ -1,14 +1,12 @@
 """Sweeps: which runs there are, and how they come to their end."""
 
 import json
-import pathlib
 import time
 from unittest import mock
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch import sweep, sweep_jobs
+from tests.fixtures import FolderTest
 
 
 class FakeEngine:
@@ -33,10 +31,9 @@ class FakeEngine:
     return over
 
 
-class SweepTest(absltest.TestCase):
+class SweepTest(FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.flags = self.folder / "flags"
     self.flags.mkdir()
     for stem in ("lfgp", "lfgp_transfer"):

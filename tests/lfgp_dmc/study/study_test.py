@@ -1,7 +1,6 @@
 """Statistics and figures of a study, from runs written here."""
 
 import json
-import pathlib
 
 import imageio.v2 as imageio
 import numpy as np
@@ -10,6 +9,7 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.study import figures, run_results, statistics
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
+from tests.fixtures import FolderTest
 
 
 def _scores(*tasks):
@@ -50,11 +50,7 @@ class StatisticsTest(absltest.TestCase):
     np.testing.assert_allclose(better, [[1.0], [1.0], [1.0]])
 
 
-class StudyTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-
+class StudyTest(FolderTest):
   def _write(self, algorithm, main_task, seed, scores, **config):
     """A run with `env_step -> successes of 4 episodes`, alike in all tasks."""
     path = self.folder / f"{algorithm}_{main_task}_{seed}{len(config)}"
