@@ -41,12 +41,7 @@ class SweepTest(FolderTest):
 
   def _jobs(self, algorithms, seeds=(0,), starts=(), arguments=()):
     jobs = sweep_jobs.make_jobs(
-      algorithms,
-      ("stack", "bring"),
-      seeds,
-      self.folder,
-      arguments,
-      self.flags,
+      algorithms, ("stack", "bring"), seeds, self.folder, arguments, self.flags
     )
     sweep_jobs.chain(jobs, starts)
     return jobs

@@ -30,14 +30,6 @@ class TrainingTest(fixtures.RunTest):
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
 
-  def test_a_finished_run_resumes_to_nothing(self):
-    config = self.config(env_steps=60)
-    run, _ = self.train(config)
-    before = (run / "metrics.csv").read_bytes()
-    _, progress = self.train(config, resume=True)
-    self.assertEqual(progress.env_step, 60)
-    self.assertEqual((run / "metrics.csv").read_bytes(), before)
-
   def test_another_config_is_not_resumed(self):
     self.train(self.config(env_steps=40))
     changed = {"agent.scheduler.xi": 10, "env_steps": 40, "seed": 4}
@@ -80,10 +72,7 @@ class TrainingTest(fixtures.RunTest):
     folder = self.folder / "lift"
     fixtures.write_dataset(folder, ("lift",), 59, 4)
     config = self.config(
-      demonstrations=str(folder),
-      environment="",
-      main_task="lift",
-      control_hz=5,
+      demonstrations=str(folder), environment="", main_task="lift", control_hz=5
     )
     with self.assertRaisesRegex(
       UserError, r"config.control_hz is 5; .* another rate: lift \(20\)"

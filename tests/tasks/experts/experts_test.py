@@ -138,10 +138,7 @@ class PlayStatesTest(parameterized.TestCase):
   @parameterized.parameters("reach", "lift")
   def test_blocks_touching_along_y(self, task):
     self._check(
-      task,
-      tcp=(0.0, 0.5, 0.2),
-      blue=pose(0.0, 0.48),
-      green=pose(0.005, 0.5202),
+      task, tcp=(0.0, 0.5, 0.2), blue=pose(0.0, 0.48), green=pose(0.005, 0.5202)
     )
 
   def _check(self, task, **start):
