@@ -10,6 +10,7 @@ from lfgp_dmc.agents.bc import BcAgent
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
+from tests import fixtures as shared
 from tests.launch import fixtures
 
 
@@ -28,7 +29,7 @@ class CloningTest(fixtures.RunTest):
   def test_leaves_rows_a_checkpoint_and_a_policy(self, algorithm):
     run, progress = self.train(self.config(algorithm))
     self.assertTrue(progress.is_complete)
-    rows = fixtures.rows(run / "metrics.csv")
+    rows = shared.rows(run / "metrics.csv")
     last = rows[-1]
     self.assertEqual(int(last["env_step"]), progress.update)
     self.assertEqual(float(last["epoch"]) - float(last["best_epoch"]), 5)

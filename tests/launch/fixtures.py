@@ -14,7 +14,7 @@ import numpy as np
 
 from lfgp_dmc import toy
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.data import csv_files, demonstrations
+from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import configs, training
 from lfgp_dmc.runs import run
 from tests import fixtures
@@ -121,18 +121,11 @@ def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   return configs.to_run_config(config)
 
 
-_RATES = ("wall_s", "steps_per_s", "updates_per_s")
-
-
-def rows(path: pathlib.Path) -> list[dict[str, str]]:
-  """A run's CSV file without what depends on the clock."""
-  _, found = csv_files.read(path)
-  return [{k: v for k, v in row.items() if k not in _RATES} for row in found]
-
-
 def numbers(run: pathlib.Path) -> list[list[dict[str, str]]]:
   """The rows of a run's metrics and of its evaluations."""
-  return [rows(run / name) for name in ("metrics.csv", "evaluation.csv")]
+  return [
+    fixtures.rows(run / name) for name in ("metrics.csv", "evaluation.csv")
+  ]
 
 
 @contextlib.contextmanager

@@ -49,14 +49,3 @@ class SweepCommandTest(FolderTest):
     again = self._call()
     self.assertEqual(again.returncode, 0)
     self.assertNotIn("started", again.stdout)
-
-  def test_bad_input_is_told(self):
-    for arguments, message in (
-      (["--seeds=a"], "--seeds: invalid literal"),
-      (["--algorithms=sorcery"], "none of these runs has a flagfile"),
-      (["--start_from=a"], "valid: TARGET:SOURCE"),
-    ):
-      done = self._call(*arguments)
-      self.assertEqual(done.returncode, 1)
-      self.assertIn(message, done.stderr)
-      self.assertNotIn("Traceback", done.stderr)

@@ -10,6 +10,7 @@ from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import loop, run_folder
 from lfgp_dmc.runs.schedule import Progress
+from tests import fixtures as shared
 from tests.launch import fixtures
 
 
@@ -17,7 +18,7 @@ class TrainingTest(fixtures.RunTest):
   def test_leaves_rows_checkpoints_and_a_policy(self):
     run, progress = self.train(self.config(evaluate_first=True))
     self.assertEqual(progress.env_step, 200)
-    self.assertLen(fixtures.rows(run / "metrics.csv"), 10)
+    self.assertLen(shared.rows(run / "metrics.csv"), 10)
     rows = evaluation_csv.read_csv(run / "evaluation.csv")
     self.assertEqual({row.env_step for row in rows}, {0, 100, 200})
     self.assertEqual({row.task for row in rows}, {"right", "left"})

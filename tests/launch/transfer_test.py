@@ -13,6 +13,7 @@ from lfgp_dmc.launch import assemble, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
+from tests import fixtures as shared
 from tests.launch import fixtures
 
 
@@ -57,7 +58,7 @@ class SacxTest(_RunTest):
     np.testing.assert_allclose(
       stored.gather_rewards(rows), np.stack(expected, axis=1), atol=1e-5
     )
-    (*_, last) = fixtures.rows(path / "metrics.csv")
+    (*_, last) = shared.rows(path / "metrics.csv")
     self.assertEqual(last["loss/discriminator"], "nan")
     self.assertNotEqual(last["reward/left"], "nan")
 
@@ -231,5 +232,5 @@ class ExamplesTest(_RunTest):
       }
     )
     self.check_resume(config)
-    (*_, last) = fixtures.rows(self.folder / "runs/whole/metrics.csv")
+    (*_, last) = shared.rows(self.folder / "runs/whole/metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
