@@ -95,16 +95,9 @@ class ContractTest(parameterized.TestCase):
     first = agent.metrics()
     names = ["discriminator", "critic", "policy", "temperature"]
     names = [f"loss/{name}" for name in names]
-    for name in [
-      "accuracy_expert",
-      "accuracy_policy",
-      "reward",
-      "q",
-      "temperature",
-      "entropy",
-      "scheduler",
-    ]:
-      names += [f"{name}/{task}" for task in TASKS]
+    by_task = ("accuracy_expert", "accuracy_policy", "reward", "q",
+               "temperature", "entropy", "scheduler")  # fmt: skip
+    names += [f"{name}/{task}" for name in by_task for task in TASKS]
     self.assertContainsSubset(names, first)
     self.assertTrue(math.isnan(first["loss/critic"]))
     self.assertEqual(sum(first[f"scheduler/{t}"] for t in TASKS), 1.0)

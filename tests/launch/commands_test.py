@@ -11,14 +11,14 @@ from lfgp_dmc import graphics, task_names
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, policies, training
 from lfgp_dmc.pictures import video
+from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 
 
-class DemoTest(absltest.TestCase):
+class DemoTest(FolderTest):
   def test_collects_trains_and_leaves_table_figure_and_video(self):
-    folder = pathlib.Path(self.create_tempdir().full_path)
     flagfile = _ROOT / "launch" / "flags" / "quickstart.flags"
     stored = _ROOT / "results" / "policies" / "stack"
     done = fixtures.call(
@@ -28,7 +28,7 @@ class DemoTest(absltest.TestCase):
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
       "--config.agent.pretraining.updates=5",
-      folder,
+      self.folder,
       fresh=True,
     )
     self.assertEqual(done.returncode, 0, done.stderr)
@@ -37,9 +37,9 @@ class DemoTest(absltest.TestCase):
       r"task +untrained +warm start +trained +stored +expert\nopen_gripper",
     )
     self.assertIn("total time", done.stdout)
-    self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
+    self.assertTrue((self.folder / "runs/demo/learning_curve.png").exists())
     if not graphics.fault():
-      self.assertTrue((folder / "runs/demo/video.mp4").exists())
+      self.assertTrue((self.folder / "runs/demo/video.mp4").exists())
 
 
 class BlockRunTest(absltest.TestCase):

@@ -2,7 +2,6 @@
 
 import functools
 import os
-import pathlib
 
 import numpy as np
 from absl.testing import absltest
@@ -11,6 +10,7 @@ from lfgp_dmc import toy
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
+from tests.fixtures import FolderTest
 
 _ROWS = [
   EvaluationRow(1000, "right", 0, 7, 1, 4, 2.5),
@@ -86,9 +86,9 @@ class EvaluateTest(absltest.TestCase):
     self.assertIsNone(rows[1].steps_to_success)
 
 
-class FilesTest(absltest.TestCase):
+class FilesTest(FolderTest):
   def test_round_trip_and_append(self):
-    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
+    path = self.folder / "evaluation.csv"
     evaluation_csv.append_csv(path, _ROWS)
     evaluation_csv.append_csv(path, _ROWS[:1])
     self.assertEqual(evaluation_csv.read_csv(path), [*_ROWS, _ROWS[0]])
@@ -99,7 +99,7 @@ class FilesTest(absltest.TestCase):
     self.assertEqual(lines[2], "1000,right,1,7,0,,0.1")
 
   def test_another_csv_is_refused(self):
-    path = pathlib.Path(self.create_tempdir().full_path) / "a.csv"
+    path = self.folder / "a.csv"
     path.write_text("env_step\n1\n")
     with self.assertRaisesRegex(ValueError, "a.csv is no evaluation"):
       evaluation_csv.read_csv(path)
