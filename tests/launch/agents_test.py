@@ -2,7 +2,7 @@
 
 import inspect
 
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import task_names, types
 from lfgp_dmc.agents import synthetic
@@ -36,7 +36,3 @@ class AgentContractTest(parameterized.TestCase):
       found = inspect.signature(getattr(type(agent), member)).parameters
       expected = inspect.signature(wanted).parameters
       self.assertEqual([*found], [*expected], member)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -1,12 +1,8 @@
 """Bad input to the commands: one clear line, and nothing left behind."""
 
 import os
-import pathlib
-from concurrent import futures
 
-from absl.testing import absltest
-
-from lfgp_dmc.launch import command
+from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
 # Script, arguments, what the message says.
@@ -29,10 +25,13 @@ _BAD = (
   ("plot.py", "--runs is missing"),
   ("plot.py --runs=no/run", "no run folder no/run"),
   ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
+  ("sweep.py --seeds=a", "--seeds: invalid literal"),
+  ("sweep.py --algorithms=sorcery", "none of these runs has a flagfile"),
+  ("sweep.py --start_from=a", "valid: TARGET:SOURCE"),
   ("demo.py --stored=missing", "no run folder missing"),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )
-_BAD_COLLECTION = (
+_COLLECTION = (
   ("--output=new --task=juggle", "--task=juggle: value should be one of <sta"),
   ("--output=new --tasks=insert", "--tasks=insert is unknown; valid: stack, "),
   ("--output=new --collection=film", "one of <reset|play>"),
@@ -49,23 +48,17 @@ _BAD_COLLECTION = (
 )
 
 
-class BadInputTest(absltest.TestCase):
+class BadInputTest(FolderTest):
   def test_is_told_in_a_line_and_leaves_nothing(self):
-    folder = pathlib.Path(self.create_tempdir().full_path)
+    folder = self.folder
     (folder / "old").mkdir()
-    cases = [*_BAD]
-    for line, message in _BAD_COLLECTION:
-      cases.append((f"collect_demonstrations.py {line}", message))
-    with futures.ThreadPoolExecutor(command.cores()) as pool:
-      calls = pool.map(lambda case: fixtures.call(case[0], folder), cases)
-      for (line, message), done in zip(cases, calls, strict=True):
-        with self.subTest(line):
-          self.assertEqual(done.returncode, 1, done.stderr)
-          self.assertIn(message, done.stderr)
-          self.assertRegex(done.stderr, r"\Aerror: .*\n\Z")
+    collect = "collect_demonstrations.py"
+    of_collection = ((f"{collect} {line}", said) for line, said in _COLLECTION)
+    for line, message in (*_BAD, *of_collection):
+      with self.subTest(line):
+        done = fixtures.call(line, folder)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn(message, done.stderr)
+        self.assertRegex(done.stderr, r"\Aerror: .*\n\Z")
     self.assertEqual(os.listdir(folder), ["old"])
     self.assertEmpty(os.listdir(folder / "old"))
-
-
-if __name__ == "__main__":
-  absltest.main()

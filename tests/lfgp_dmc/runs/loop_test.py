@@ -4,7 +4,6 @@ import os
 import signal
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
@@ -161,7 +160,3 @@ class LoopTest(fixtures.FolderTest):
   def test_a_bad_schedule_names_its_field(self):
     with self.assertRaisesRegex(ValueError, "log_every is 0"):
       TrainSchedule(env_steps=1, log_every=0)
-
-
-if __name__ == "__main__":
-  absltest.main()

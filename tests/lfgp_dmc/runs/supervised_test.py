@@ -3,8 +3,6 @@
 import os
 import signal
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.runs import supervised
 from lfgp_dmc.runs.metrics import MetricsLog
@@ -107,7 +105,3 @@ class SupervisedTest(fixtures.FolderTest):
   def test_may_evaluate_first(self):
     self._train(_Agent(converges_after=1), evaluate_first=True)
     self.assertEqual(self._evaluated, [0, 10])
-
-
-if __name__ == "__main__":
-  absltest.main()
