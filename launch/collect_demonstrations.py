@@ -25,6 +25,11 @@ _COLLECTION = flags.DEFINE_string(
   "collection", "reset", "reset (before each attempt) or play (none between)."
 )
 _PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.")
+_ATTEMPTS = flags.DEFINE_integer(
+  "attempts_per_task",
+  0,
+  "Whole successful attempts a task, instead of --pairs_per_task.",
+)
 _FINALS = flags.DEFINE_integer(
   "final_pairs",
   0,
@@ -94,6 +99,7 @@ def main() -> int:
       _PAIRS.value,
       workers=_WORKERS.value or command.cores(),
       finals=_FINALS.value,
+      attempts=_ATTEMPTS.value,
     )
   except collection.NoSuccessError as error:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
@@ -117,7 +123,18 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
   command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   command.check_least("pairs_per_task", _PAIRS.value, 1)
+  command.check_least("attempts_per_task", _ATTEMPTS.value, 0)
   command.check_least("final_pairs", _FINALS.value, 0)
+  if _ATTEMPTS.value and _PAIRS.present:
+    raise command.UserError(
+      f"--attempts_per_task={_ATTEMPTS.value} and --pairs_per_task="
+      f"{_PAIRS.value}; valid: one of the two"
+    )
+  if _ATTEMPTS.value and _FINALS.value:
+    raise command.UserError(
+      f"--final_pairs={_FINALS.value}; valid: 0 with --attempts_per_task "
+      "(every attempt ends with its row of success)"
+    )
   command.check_least("longest_of", _LONGEST.value, 1)
   if _LONGEST.value > 1 and _COLLECTION.value != "reset":
     raise command.UserError(

@@ -52,11 +52,24 @@ def load(
 def _counted(
   config: RunConfig, found: dict[str, Demonstrations]
 ) -> dict[str, Demonstrations]:
-  """As many pairs a task as the config says, the first ones.
+  """As many pairs or attempts a task as the config says, the first ones.
 
   Raises:
     UserError: a task has fewer.
   """
+  wanted = config.attempts_per_task
+  if wanted:
+    short = [
+      f"{task} ({data.attempts})"
+      for task, data in found.items()
+      if data.attempts < wanted
+    ]
+    if short:
+      raise UserError(
+        f"config.attempts_per_task is {wanted}; {config.demonstrations} has "
+        f"fewer whole attempts of {', '.join(short)}"
+      )
+    return {task: data.first_attempts(wanted) for task, data in found.items()}
   if not config.pairs_per_task:
     return found
   short = [

@@ -45,25 +45,30 @@ def collect(
   workers: int = 1,
   progress: bool = True,
   finals: int = 0,
+  attempts: int = 0,
 ) -> dict[str, Collected]:
   """Collects exactly `pairs` pairs of each task, and `finals` on top.
+
+  Or, if `attempts` is above 0, so many whole successful attempts of each.
 
   Args:
     plan: environments, actor, T_all and seed.
     collection: "reset" or "play".
     tasks: which tasks of T_all to keep the pairs of.
     pairs: N, pairs a task; the last attempt is cut there, and its rows then
-      have no `is_last`.
+      have no `is_last`. Not used with `attempts`.
     workers: processes.
     progress: whether to show a progress bar.
     finals: extra pairs a task, each the row of success of a further attempt
       and an episode of its own (the authors' later journal version).
+    attempts: whole successful attempts a task; every one ends with its
+      `is_last`. 0: count pairs.
 
   Returns:
     Task -> its pairs; the same whatever the number of workers.
 
   Raises:
-    ValueError: an unknown collection or task.
+    ValueError: an unknown collection or task, or `attempts` with `finals`.
     NoSuccessError: a task failed very often in a row.
   """
   if collection not in COLLECTIONS:
@@ -75,9 +80,16 @@ def collect(
       raise ValueError(
         f"{task!r} is not a task of T_all: {', '.join(plan.tasks)}"
       )
-  piles = {task: _Pile(task, pairs, finals) for task in tasks}
+  if attempts and finals:
+    raise ValueError("extra finals are of attempts that are cut by pairs")
+  if attempts:
+    piles = {task: _AttemptPile(task, attempts) for task in tasks}
+  else:
+    piles = {task: _Pile(task, pairs, finals) for task in tasks}
   with tqdm.tqdm(
-    total=(pairs + finals) * len(piles), unit="pair", disable=not progress
+    total=(attempts or pairs + finals) * len(piles),
+    unit="attempt" if attempts else "pair",
+    disable=not progress,
   ) as bar:
     if collection == "play":
       bar.set_description("play")
@@ -138,6 +150,8 @@ class _OpenUnits:
 class _Pile:
   """The pairs of one task so far."""
 
+  _unit = "pairs"
+
   def __init__(self, task: str, pairs: int, finals: int):
     self._task, self._pairs, self._wanted = task, pairs, pairs + finals
     self._rows: list[Rows] = []
@@ -149,7 +163,7 @@ class _Pile:
     return self._stored >= self._wanted
 
   def add(self, attempt: Attempt) -> int:
-    """Takes an attempt in, unless full; returns how many pairs it added.
+    """Takes an attempt in, unless full; returns how much it added.
 
     Raises:
       NoSuccessError: too many failures in a row.
@@ -162,16 +176,20 @@ class _Pile:
       if self._failures >= _MOST_FAILURES:
         raise NoSuccessError(
           f"{self._task}: {self._failures} attempts in a row failed; "
-          f"{self._stored} of {self._wanted} pairs collected"
+          f"{self._stored} of {self._wanted} {self._unit} collected"
         )
       return 0
     self._failures = 0
+    return self._store(attempt.rows)
+
+  def _store(self, rows: Rows) -> int:
+    """Keeps what is wanted of the rows; returns how many pairs that is."""
     before = self._stored
     if before < self._pairs:
-      self._rows.append(attempt.rows)
-      self._stored = min(before + len(attempt.rows.action), self._pairs)
+      self._rows.append(rows)
+      self._stored = min(before + len(rows.action), self._pairs)
     else:
-      self._rows.append(Rows(*(part[-1:] for part in attempt.rows)))
+      self._rows.append(Rows(*(part[-1:] for part in rows)))
       self._stored += 1
     return self._stored - before
 
@@ -184,8 +202,7 @@ class _Pile:
     observation, action, next_observation = (
       np.concatenate(parts) for parts in zip(*self._rows, strict=True)
     )
-    finals = self._wanted - self._pairs
-    kept = np.r_[: self._pairs, len(action) - finals : len(action)]
+    kept = self._kept(len(action))
     return Collected(
       Demonstrations(
         observation[kept],
@@ -197,3 +214,26 @@ class _Pile:
       self._attempts,
       len(self._rows),
     )
+
+  def _kept(self, rows: int) -> np.ndarray:
+    """Which of the stored rows are wanted: the first, and the finals."""
+    finals = self._wanted - self._pairs
+    return np.r_[: self._pairs, rows - finals : rows]
+
+
+class _AttemptPile(_Pile):
+  """The whole attempts of one task so far."""
+
+  _unit = "attempts"
+
+  def __init__(self, task: str, attempts: int):
+    super().__init__(task, attempts, 0)
+
+  def _store(self, rows: Rows) -> int:
+    """Keeps all rows; counts one attempt."""
+    self._rows.append(rows)
+    self._stored += 1
+    return 1
+
+  def _kept(self, rows: int) -> np.ndarray:
+    return np.arange(rows)

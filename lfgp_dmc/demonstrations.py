@@ -45,9 +45,21 @@ class Demonstrations:
     """The five arrays by name."""
     return {k: getattr(self, k) for k in demonstration_faults.DTYPES}
 
+  @property
+  def attempts(self) -> int:
+    """How many whole attempts there are."""
+    return int(self.is_last.sum())
+
   def head(self, pairs: int) -> "Demonstrations":
     """The first `pairs` pairs."""
     cut = {name: array[:pairs] for name, array in self.arrays().items()}
+    return Demonstrations(**cut, attributes=self.attributes)
+
+  def first_attempts(self, attempts: int) -> "Demonstrations":
+    """The pairs of the first `attempts` whole attempts."""
+    whole = self.episode[self.is_last][:attempts]
+    kept = np.isin(self.episode, whole)
+    cut = {name: array[kept] for name, array in self.arrays().items()}
     return Demonstrations(**cut, attributes=self.attributes)
 
 

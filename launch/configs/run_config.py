@@ -24,6 +24,7 @@ class RunConfig:
   # Demonstrations.
   demonstrations: str = ""  # dataset folder: a file a task
   pairs_per_task: int = 0  # use the first so many of each file; 0: all
+  attempts_per_task: int = 0  # likewise whole attempts, instead; 0: all
   mirror_demonstrations: bool = False  # and as many mirror images of them
   collect_pairs: int = 0  # collect so many a task if there is no folder
 
@@ -81,6 +82,11 @@ class RunConfig:
         "config.mirror_demonstrations is True; valid: False with "
         "config.environment (only the block tasks' mirror image is known)"
       )
+    if self.attempts_per_task and self.pairs_per_task:
+      faults.append(
+        f"config.attempts_per_task is {self.attempts_per_task}; valid: 0 with "
+        f"config.pairs_per_task ({self.pairs_per_task})"
+      )
     if self.control_hz not in CONTROL_RATES:
       faults.append(
         f"config.control_hz is {self.control_hz!r}; valid: "
@@ -120,8 +126,8 @@ def _is_integer(value: Any) -> bool:
 
 
 _LEAST = {
-  0: "seed pairs_per_task collect_pairs evaluation_seed evaluation_workers "
-  "threads",
+  0: "seed pairs_per_task attempts_per_task collect_pairs evaluation_seed "
+  "evaluation_workers threads",
   1: "env_steps log_every evaluate_every checkpoint_every "
   "evaluation_episodes replay_capacity",
 }

@@ -26,6 +26,18 @@ _BAD = (
   ("--output=new --collection=film", "valid: reset, play"),
   ("--output=new --pairs_per_task=0", "--pairs_per_task=0; valid: 1 or more"),
   ("--output=new --final_pairs=-1", "--final_pairs=-1; valid: 0 or more"),
+  (
+    "--output=new --attempts_per_task=-1",
+    "--attempts_per_task=-1; valid: 0 or more",
+  ),
+  (
+    "--output=new --attempts_per_task=5 --pairs_per_task=9",
+    "--attempts_per_task=5 and --pairs_per_task=9; valid: one of the two",
+  ),
+  (
+    "--output=new --attempts_per_task=5 --final_pairs=9",
+    "--final_pairs=9; valid: 0 with --attempts_per_task",
+  ),
   ("--output=new --longest_of=0", "--longest_of=0; valid: 1 or more"),
   ("--output=new --longest_of=2 --collection=play", "valid: 1 with"),
   ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),

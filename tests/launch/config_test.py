@@ -86,6 +86,10 @@ class ConfigTest(parameterized.TestCase):
         self.assertIn(message, str(error))
         raise ValueError("") from None
 
+  def test_pairs_and_attempts_are_not_both_counted(self):
+    with self.assertRaisesRegex(ValueError, "attempts_per_task is 5; valid: 0"):
+      resolve("--config.attempts_per_task=5", "--config.pairs_per_task=9")
+
   def test_only_the_block_tasks_have_mirror_images(self):
     images = "--config.mirror_demonstrations"
     self.assertTrue(resolve(images).mirror_demonstrations)

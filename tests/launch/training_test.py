@@ -96,6 +96,10 @@ class TrainingTest(parameterized.TestCase):
     ({"environment": "nothing.at:all"}, "No module named 'nothing'"),
     ({"device": "abacus"}, "config.device is 'abacus'"),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
+    (
+      {"attempts_per_task": 61},
+      r"is 61; .* has fewer whole attempts of right \(\d+\), left \(\d+\)",
+    ),
     ({"main_task": "up"}, "up.hdf5: missing"),
     (
       {"agent.scheduler": "weighted_random_handcrafted"},
@@ -136,6 +140,13 @@ class TrainingTest(parameterized.TestCase):
       self._train(self._config(pairs_per_task=20))
     agent = train.call_args.args[1]
     self.assertEqual(agent._experts._sizes.tolist(), [20, 20])
+
+  def test_uses_the_first_attempts_alone(self):
+    with mock.patch.object(loop, "train") as train:
+      train.return_value = loop.Progress()
+      self._train(self._config(attempts_per_task=2))
+    agent = train.call_args.args[1]
+    self.assertEqual(agent._experts._final_sizes.tolist(), [2, 2])
 
   def test_a_smaller_replay_resumes_too(self):
     config = self._config(replay_capacity=60, env_steps=120)

@@ -122,6 +122,27 @@ class CollectTest(parameterized.TestCase):
       self.assertTrue((reached > 0.6).all())
 
   @parameterized.parameters("reset", "play")
+  def test_whole_attempts_can_be_counted_instead(self, kind):
+    plain = _collect(_plan(), kind, pairs=90)
+    found = collection.collect(
+      _plan(), kind, toy.TASKS, 1, progress=False, attempts=7
+    )
+    for task in toy.TASKS:
+      data = found[task].demonstrations
+      self.assertEqual(data.attempts, 7)
+      self.assertEqual(found[task].successes, 7)
+      self.assertTrue(data.is_last[-1])
+      self.assertLen(np.unique(data.episode), 7)
+      for name, array in plain[task].demonstrations.arrays().items():
+        np.testing.assert_array_equal(array[: len(data)], data.arrays()[name])
+
+  def test_attempts_and_finals_exclude_each_other(self):
+    with self.assertRaisesRegex(ValueError, "extra finals"):
+      collection.collect(
+        _plan(), "reset", toy.TASKS, 9, progress=False, finals=2, attempts=3
+      )
+
+  @parameterized.parameters("reset", "play")
   def test_only_successes_are_kept(self, kind):
     found = _collect(_plan(), kind, ("right",), pairs=200)
     data = found["right"].demonstrations

@@ -95,6 +95,15 @@ class DemonstrationsTest(parameterized.TestCase):
     )
     self.assertLen(read.head(4), 4)
 
+  def test_the_first_whole_attempts(self):
+    data = _demonstrations()  # two attempts; the second is cut
+    self.assertEqual(data.attempts, 1)
+    for wanted in (1, 2):  # what is cut is not an attempt
+      first = data.first_attempts(wanted)
+      self.assertLen(first, 3)
+      self.assertTrue(first.is_last[-1])
+      np.testing.assert_array_equal(first.action, data.action[:3])
+
   def test_the_same_data_are_the_same_bytes(self):
     self._write()
     first = self._path.read_bytes()
