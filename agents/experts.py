@@ -6,6 +6,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import torch
 
+from agents import translation
+
 
 class DemonstrationArrays(Protocol):
   """One task's demonstrations as arrays of N rows."""
@@ -21,6 +23,10 @@ class DemonstrationArrays(Protocol):
   @property
   def next_observation(self) -> np.ndarray:
     """float32 [N, O]."""
+
+  @property
+  def episode(self) -> np.ndarray:
+    """The attempt that each row belongs to, int32 [N]."""
 
   @property
   def is_last(self) -> np.ndarray:
@@ -45,6 +51,7 @@ class Batch(NamedTuple):
   # example of, or -1 for a transition of the replay.
   owner: torch.Tensor | None = None
   examples: int = 0  # how many of the last rows are examples
+  shown: int = 0  # how many of the last rows are the experts'
 
 
 def pooled_observations(
@@ -93,6 +100,9 @@ class ExpertPool:
     tasks: Sequence[str],
     standardise: Callable[[torch.Tensor], torch.Tensor],
     device: torch.device | str = "cpu",
+    final_rows: int = 1,
+    translation_reach: float = 0.0,
+    main_share: float = 0.0,
   ):
     """Copies the demonstrations to the device, standardised.
 
@@ -101,6 +111,11 @@ class ExpertPool:
       tasks: the K tasks, in the order of every K axis; main first.
       standardise: raw observations [N, O] -> network inputs.
       device: where to keep them.
+      final_rows: how many last rows of an attempt count as rows of success.
+      translation_reach: m, rows of tasks that no slot pins are shifted in the
+        plane by at most so much, afresh whenever they are drawn.
+      main_share: of the transitions for critics, the main task's; 0: as much
+        as any other task's.
 
     Raises:
       ValueError: a task has no demonstrations.
@@ -121,12 +136,16 @@ class ExpertPool:
     self._tasks = tuple(tasks)
     self._sizes = np.array([len(part.action) for part in parts])
     self._offsets = _offsets(self._sizes)
-    last = np.concatenate([part.is_last for part in parts])
-    self._finals = np.flatnonzero(last)
-    self._final_sizes = np.array([int(part.is_last.sum()) for part in parts])
+    self._main_share = main_share
+    self._reach = np.array(
+      [0.0 if t in translation.PINNED else translation_reach for t in tasks]
+    )
+    lasts = [_last_rows(part, final_rows) for part in parts]
+    self._finals = np.flatnonzero(np.concatenate(lasts))
+    self._final_sizes = np.array([int(last.sum()) for last in lasts])
     self._final_offsets = _offsets(self._final_sizes)
     # A task that has nothing but rows of success draws from them throughout.
-    rest = [~p.is_last if not p.is_last.all() else p.is_last for p in parts]
+    rest = [~last if not last.all() else last for last in lasts]
     self._rest = np.flatnonzero(np.concatenate(rest))
     self._rest_sizes = np.array([int(part.sum()) for part in rest])
     self._rest_offsets = _offsets(self._rest_sizes)
@@ -181,6 +200,10 @@ class ExpertPool:
       )
       index = np.concatenate([self._rest[rest], self._finals[chosen]], axis=1)
     at = torch.from_numpy(index).to(self._device)
+    if self._reach.any():
+      reach = np.repeat(self._reach[:, None], rows, axis=1)
+      inputs, _ = self._shifted(at, reach, generator)
+      return ExpertBatch(inputs, self._action[at])
     return ExpertBatch(self._inputs[at], self._action[at])
 
   def sample_transitions(
@@ -198,6 +221,9 @@ class ExpertPool:
     task = self._split(rows)
     index = self._offsets[task] + generator.integers(self._sizes[task])
     at = torch.from_numpy(index).to(self._device)
+    if self._reach.any():
+      inputs, following = self._shifted(at, self._reach[task], generator)
+      return Batch(inputs, self._action[at], following)
     return Batch(self._inputs[at], self._action[at], self._next_inputs[at])
 
   def sample_examples(
@@ -232,14 +258,39 @@ class ExpertPool:
       disturbed(), self._action[at], disturbed(), owner=owner, examples=rows
     )
 
+  def _shifted(
+    self, at: torch.Tensor, reach: np.ndarray, generator: np.random.Generator
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """Inputs of rows and of what follows them, shifted in the plane."""
+    observation, following = translation.shifted(
+      self._observation[at], self._next_observation[at], reach, generator
+    )
+    return self._standardise(observation), self._standardise(following)
+
   def _split(self, rows: int) -> np.ndarray:
-    """The task of each of `rows` rows: equal shares, the rest the main's."""
+    """The task of each of `rows` rows: equal shares, the rest the main's.
+
+    With a share of its own, the main task has that first.
+    """
     tasks = len(self._sizes)
+    own = int(self._main_share * rows) if tasks > 1 else 0
     counts = np.full(tasks, rows // tasks)
-    counts[0] += rows % tasks
+    if own:
+      counts[:] = (rows - own) // (tasks - 1)
+    counts[0] = rows - counts[1:].sum()
     return np.repeat(np.arange(tasks), counts)
 
 
 def _offsets(sizes: np.ndarray) -> np.ndarray:
   """Where each part starts, if parts of these sizes lie end to end."""
   return np.concatenate([[0], np.cumsum(sizes)[:-1]])
+
+
+def _last_rows(part: DemonstrationArrays, count: int) -> np.ndarray:
+  """The last `count` rows of every whole attempt, bool [N]."""
+  chosen = last = part.is_last.copy()
+  for _ in range(count - 1):
+    same = part.episode[1:] == part.episode[:-1]
+    last = np.append(last[1:] & same, False)
+    chosen = chosen | last
+  return chosen

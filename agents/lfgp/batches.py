@@ -120,7 +120,7 @@ class BatchMaker:
     if not expert_rows:
       return batch
     expert = self._pool().sample_transitions(self.generator, expert_rows)
-    return _joined(batch, expert)
+    return _joined(batch, expert)._replace(shown=expert_rows)
 
   def _transitions(self, rows: int) -> Batch:
     """Transitions of the replay, with their rewards if those are used."""

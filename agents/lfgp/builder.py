@@ -63,7 +63,15 @@ def build(
       standardiser.fit(observation, config.deviation_floor)
   standardiser.to(device)
   if config.uses_demonstrations:
-    experts = ExpertPool(demonstrations, tasks, standardiser, device)
+    experts = ExpertPool(
+      demonstrations,
+      tasks,
+      standardiser,
+      device,
+      config.final_rows,
+      config.translation_reach,
+      config.main_expert_share,
+    )
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
     config, len(tasks), action_size, standardiser, initial, device

@@ -71,6 +71,7 @@ class LfgpConfig:
   discriminator_noise: float = 0.0  # on observations, in deviations
   discriminator_every: int = 1  # updates between its updates
   discriminator_final_share: float = 0.0  # of expert pairs, rows of success
+  final_rows: int = 1  # last rows of an attempt that are rows of success
   gradient_penalty: float = 10.0  # lambda
   gradient_penalty_per_task: bool = False
   gradient_penalty_mixing: str = "float"  # a share for each; "row": one for all
@@ -88,6 +89,9 @@ class LfgpConfig:
   # Use of demonstrations beyond the discriminators.
   expert_share: float = 0.0  # of the critics' and intentions' batch
   expert_share_decay: float = 1.0  # factor an update
+  main_expert_share: float = 0.0  # of these, the main task's; 0: like any other
+  intentions_on_experts: bool = True  # or critics alone learn from such rows
+  translation_reach: float = 0.0  # m, shift of expert rows, where no slot pins
   bc_loss: str = cloning.SQUARED_ERROR  # or "likelihood"; prior: divergence
   bc_weight: float = 0.0  # BC term in the intentions' loss
   bc_normalise: bool = False  # times each task's mean |Q|
@@ -185,7 +189,7 @@ class LfgpConfig:
 
 
 _INTEGERS_ABOVE_0 = (
-  "warm_up episode_steps hidden_size batch_size xi "
+  "warm_up episode_steps hidden_size batch_size xi final_rows "
   "discriminator_batch_size discriminator_every value_penalty_window"
 )
 _NUMBERS_ABOVE_0 = (
@@ -197,15 +201,16 @@ _NUMBERS_ABOVE_0 = (
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
   "value_penalty example_noise fine_scale prior_weight "
-  "cloned_deviation"
+  "cloned_deviation translation_reach"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "
-  "bc_decay scheduler_phi main_weight handcrafted_probability example_share"
+  "bc_decay scheduler_phi main_weight handcrafted_probability example_share "
+  "main_expert_share"
 )
 _SWITCHES = (
   "critic_layer_norm standardise bfloat16 cuda_graphs bc_normalise "
-  "gradient_penalty_per_task absorbing_flag"
+  "gradient_penalty_per_task absorbing_flag intentions_on_experts"
 )
 # What is valid -> names of fields; see `field_checks.py`.
 _RANGES = {

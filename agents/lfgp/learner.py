@@ -116,6 +116,8 @@ class LfgpLearner:
     if batch.owner is not None:  # intentions learn from the replay's rows
       inputs = inputs[: len(inputs) - batch.examples]
       batch = self.intentions.with_fresh_actions(batch)
+    if not self._config.intentions_on_experts:
+      inputs = inputs[: len(inputs) - batch.shown]
     trunk = self.networks.intentions.trunk
     with frozen(list(trunk.parameters()) if phase.freezes_trunk else []):
       metrics |= self.critics.update(batch, self.rewards_of(batch))
