@@ -96,6 +96,9 @@ class LfgpConfig:
   bc_weight: float = 0.0  # BC term in the intentions' loss
   bc_normalise: bool = False  # times each task's mean |Q|
   bc_decay: float = 1.0  # factor on the weight an update
+  # Above 0: intentions imitate rows by their advantage, in so many deviations of
+  # it, instead of following the critics' gradient.
+  advantage_scale: float = 0.0
   prior_weight: float = 0.0  # stay near the first intentions, on all rows
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start; falls to 0, a cosine
@@ -201,7 +204,7 @@ _NUMBERS_ABOVE_0 = (
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
   "value_penalty example_noise fine_scale prior_weight "
-  "cloned_deviation translation_reach"
+  "cloned_deviation translation_reach advantage_scale"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "
