@@ -56,6 +56,7 @@ class LfgpConfig:
   reward_source: str = "discriminator"  # or "replay", "examples"
   reward: str = "logit"  # of discriminators; see agents/rewards.py
   reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
+  absorbing_reward: float = 0.0  # a greater one is earned for ever; 0: none is
   reward_scale: float = 1.0  # later work, with examples: 0.1
   example_share: float = 0.5  # of the critics' batch, if rewards are examples'
   example_noise: float = 0.1  # on examples, in the demonstrations' deviations
@@ -204,7 +205,7 @@ _NUMBERS_ABOVE_0 = (
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
   "value_penalty example_noise fine_scale prior_weight "
-  "cloned_deviation translation_reach advantage_scale"
+  "cloned_deviation translation_reach advantage_scale absorbing_reward"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "
