@@ -33,9 +33,7 @@ class TranslationTest(absltest.TestCase):
     shift = moved[:, :2] - rows[:, :2]
     for at in ((12, 13), (19, 20)):
       torch.testing.assert_close(moved[:, at] - rows[:, at], shift)
-      torch.testing.assert_close(
-        later[:, at] - rows.flip(0)[:, at], shift
-      )
+      torch.testing.assert_close(later[:, at] - rows.flip(0)[:, at], shift)
     for at, block in (((47, 48), (12, 13)), ((50, 51), (19, 20))):
       torch.testing.assert_close(
         moved[:, at] + moved[:, block], rows[:, at] + rows[:, block]
