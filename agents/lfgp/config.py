@@ -56,7 +56,6 @@ class LfgpConfig:
   reward_source: str = "discriminator"  # or "replay", "examples"
   reward: str = "logit"  # of discriminators; see agents/rewards.py
   reward_clip: float = 0.0  # bound on |reward| before scaling; 0: none
-  absorbing_reward: float = 0.0  # a greater one is earned for ever; 0: none is
   reward_scale: float = 1.0  # later work, with examples: 0.1
   example_share: float = 0.5  # of the critics' batch, if rewards are examples'
   example_noise: float = 0.1  # on examples, in the demonstrations' deviations
@@ -97,9 +96,6 @@ class LfgpConfig:
   bc_weight: float = 0.0  # BC term in the intentions' loss
   bc_normalise: bool = False  # times each task's mean |Q|
   bc_decay: float = 1.0  # factor on the weight an update
-  # Above 0: intentions imitate rows by their advantage, in so many deviations of
-  # it, instead of following the critics' gradient.
-  advantage_scale: float = 0.0
   prior_weight: float = 0.0  # stay near the first intentions, on all rows
   bc_warm_start_updates: int = 0  # pure BC before the first step
   bc_learning_rate: float = 3e-4  # of the warm start; falls to 0, a cosine
@@ -205,7 +201,7 @@ _NUMBERS_ABOVE_0 = (
 _NUMBERS_FROM_0 = (
   "weight_decay discriminator_noise gradient_penalty reward_clip bc_weight "
   "value_penalty example_noise fine_scale prior_weight "
-  "cloned_deviation translation_reach advantage_scale absorbing_reward"
+  "cloned_deviation translation_reach"
 )
 _SHARES = (
   "discount discriminator_final_share expert_share expert_share_decay "

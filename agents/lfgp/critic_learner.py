@@ -62,12 +62,6 @@ class CriticLearner:
     """
     config = self._config
     target = self._target(batch, reward)
-    if config.absorbing_reward > 0:  # staying there for ever
-      target = torch.where(
-        reward > config.absorbing_reward,
-        reward / (1 - config.discount),
-        target,
-      )
     q = self._networks.critics(batch.inputs.to(self._dtype), batch.action)
     mask = None
     if batch.owner is not None:  # an example serves its own task alone

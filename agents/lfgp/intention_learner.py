@@ -68,18 +68,12 @@ class IntentionLearner:
     own = action[batch.owner[first:], rows]
     return batch._replace(action=torch.cat([batch.action[:first], own]))
 
-  def update(
-    self,
-    inputs: torch.Tensor,
-    expert: ExpertBatch | None,
-    batch: Batch | None = None,
-  ) -> Metrics:
+  def update(self, inputs: torch.Tensor, expert: ExpertBatch | None) -> Metrics:
     """One update of intentions, then of temperatures.
 
     Args:
       inputs: [B, O], the replay's.
       expert: each task's own pairs; None: no BC term.
-      batch: what critics learn from, for the advantage's regression.
 
     Returns:
       Metrics of the losses.
@@ -97,9 +91,6 @@ class IntentionLearner:
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
-    if self._config.advantage_scale > 0 and batch is not None:
-      loss, more = self._advantage_regression(batch)
-      metrics |= more
     terms, more = self._cloning_terms(expert, inputs, mean, deviation, q)
     loss, metrics = loss + terms, metrics | more
     norm = clipped_step(
@@ -114,27 +105,6 @@ class IntentionLearner:
       "saturation": saturated.mean((1, 2)),
     }
     return metrics | self._update_temperatures(log_prob.detach())
-
-  def _advantage_regression(self, batch: Batch) -> tuple[torch.Tensor, Metrics]:
-    """Imitates what was done, by how much better than now it is worth.
-
-    sum_k mean_b w (tanh(mean) - a)^2 with w = exp(A / (scale * std A)), A the
-    advantage of the row's action over the intention's mean action.
-    """
-    networks = self._networks
-    inputs = batch.inputs.to(self._dtype)
-    mean, _ = networks.intentions(inputs)
-    with torch.no_grad():
-      features = networks.critics.trunk(inputs)
-      done = networks.critics.heads(features, batch.action).amin(0)
-      now = networks.critics.heads(features, torch.tanh(mean)).amin(0)
-      advantage = done - now
-      unit = advantage.std(-1, keepdim=True).clamp(min=1e-3)
-      weight = (advantage / (self._config.advantage_scale * unit)).exp()
-      weight = weight.clamp(max=20.0)
-    error = (torch.tanh(mean) - batch.action).square().sum(-1)
-    loss = (weight * error).mean(-1).sum()
-    return loss, {"behaviour_cloning": error.detach().mean(-1)}
 
   def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
     config, parameter = self._config, self._networks.log_temperature

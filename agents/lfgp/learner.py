@@ -122,7 +122,7 @@ class LfgpLearner:
     with frozen(list(trunk.parameters()) if phase.freezes_trunk else []):
       metrics |= self.critics.update(batch, self.rewards_of(batch))
       if phase.trains_intentions:
-        metrics |= self.intentions.update(inputs, expert, batch)
+        metrics |= self.intentions.update(inputs, expert)
     polyak(
       self.networks.target_critics, self.networks.critics, self._config.polyak
     )
