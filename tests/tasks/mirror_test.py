@@ -86,14 +86,6 @@ class MirrorTest(parameterized.TestCase):
         pair = images[:, column], expected[:, column]
         self.assertGreater(np.corrcoef(*pair)[0, 1], 0.5, column)
 
-  def test_twice_is_not_at_all(self):
-    rows = np.random.default_rng(0).uniform(-1, 1, (5, 63)).astype(np.float32)
-    again = mirror.observation(mirror.observation(rows[:, :59]))
-    np.testing.assert_allclose(again, rows[:, :59], atol=1e-6)
-    np.testing.assert_array_equal(
-      mirror.action(mirror.action(rows[:, 59:])), rows[:, 59:]
-    )
-
   def test_demonstrations_are_followed_by_their_images(self):
     random = np.random.default_rng(0)
     shown = Demonstrations(
