@@ -104,55 +104,53 @@ class StoredTest(FolderTest):
     config = json.loads((self.folder / "config.json").read_text())
     self.assertEqual(config["seed"], 7)
 
-  def test_missing_files_are_named(self):
+  def test_missing_and_damaged_files_are_named(self):
     _policy().save(self.folder)
-    (self.folder / "policy.safetensors").unlink()
-    with self.assertRaisesRegex(FileNotFoundError, "policy.safetensors is mis"):
-      Policy.load(self.folder)
-    with self.assertRaisesRegex(FileNotFoundError, "config.json is missing"):
-      Policy.load(self.folder.parent)
-
-  def test_damaged_arrays_are_named(self):
-    _policy().save(self.folder)
-    path = self.folder / "policy.safetensors"
-    path.write_bytes(path.read_bytes()[:-10])
-    with self.assertRaisesRegex(ValueError, "policy.safetensors: not readable"):
-      Policy.load(self.folder)
-
-  def test_damaged_config_is_named(self):
-    _policy().save(self.folder)
+    config = self.folder / "config.json"
+    arrays = self.folder / "policy.safetensors"
+    whole = config.read_text()
     for text in ("{", "[]", "{}", '{"policy": 3}'):
-      (self.folder / "config.json").write_text(text)
-      with self.assertRaisesRegex(ValueError, "config.json"):
-        Policy.load(self.folder)
+      config.write_text(text)
+      self._check_refused(ValueError, "config.json")
+    config.write_text(whole)
+    arrays.write_bytes(arrays.read_bytes()[:-10])
+    self._check_refused(ValueError, "policy.safetensors: not readable")
+    arrays.unlink()
+    self._check_refused(FileNotFoundError, "policy.safetensors is missing")
+    config.unlink()
+    self._check_refused(FileNotFoundError, "config.json is missing")
 
-  def test_arrays_that_do_not_fit_are_listed(self):
+  def _check_refused(self, error, message):
+    with self.assertRaisesRegex(error, message):
+      Policy.load(self.folder)
+
+  def test_arrays_and_options_that_do_not_fit_are_listed(self):
     policy = _policy()
     arrays, options = policy.arrays(), policy.options()
     del arrays["trunk.first.bias"]
     arrays["other"] = np.zeros(1, np.float32)
     arrays["trunk.second.bias"] = np.zeros(2, np.float32)
     arrays["trunk.first.weight"][0, 0] = np.nan
-    with self.assertRaises(ValueError) as caught:
-      Policy.from_arrays(arrays, options)
-    for fault in (
+    self._check_faults(
+      arrays,
+      options,
       "trunk.first.bias is missing",
       "other is not known",
       "trunk.second.bias has shape [2], not [8]",
       "trunk.first.weight holds numbers that are not finite",
-    ):
-      self.assertIn(fault, str(caught.exception))
-
-  def test_wrong_options_are_listed(self):
-    policy = _policy()
-    options = policy.options() | {"action_size": "3", "tasks": [], "scale": 1}
-    with self.assertRaises(ValueError) as caught:
-      Policy.from_arrays(policy.arrays(), options)
-    for fault in (
+    )
+    self._check_faults(
+      policy.arrays(),
+      options | {"action_size": "3", "tasks": [], "scale": 1},
       "policy.tasks is []; valid: ",
       "policy.action_size is '3'; valid: a valid integer",
       "unknown policy.scale",
-    ):
+    )
+
+  def _check_faults(self, arrays, options, *faults):
+    with self.assertRaises(ValueError) as caught:
+      Policy.from_arrays(arrays, options)
+    for fault in faults:
       self.assertIn(fault, str(caught.exception))
 
   def test_a_policy_stored_without_a_layout_has_a_trunk(self):

@@ -89,11 +89,8 @@ class AgentTest(absltest.TestCase):
           "scheduler.kind": "main_only",
         },
       )
-      for _ in range(200):
-        agent.update()
-      agent.metrics()
-      agent.update()
-      means[penalty] = agent.metrics()
+      fixtures.train(agent, 200)
+      means[penalty] = fixtures.train(agent, 1)
     self.assertTrue(math.isnan(means[0.0]["value_high/reach"]))
     high = means[10.0]["value_high/reach"]
     self.assertAlmostEqual(high, 2.0, places=3)
