@@ -32,6 +32,8 @@ def state(**changes) -> Snapshot:
 _ON_GREEN = {"blue_on_green": True, "blue_on_tray": False}
 _IN_ZONE = {"blue": (0.075, 0.5, 0.145)}
 _CLOSES = {"action": (0, 0, 0, 0.5)}
+_NEAR_GREEN = {"tcp": (-0.15, 0.5, 0.2)}
+_JERKS = {"blue_speed": 0.1, "blue_acceleration": 5.1}
 
 
 class ConditionsTest(parameterized.TestCase):
@@ -53,12 +55,7 @@ class ConditionsTest(parameterized.TestCase):
     ("does_not_open_at_0", "open_gripper", {}, False),
     ("closing_is_no_opening", "open_gripper", _CLOSES, False),
     ("closes", "close_gripper", _CLOSES, True),
-    (
-      "near_green",
-      "close_gripper",
-      {**_CLOSES, "tcp": (-0.15, 0.5, 0.2)},
-      True,
-    ),
+    ("near_green", "close_gripper", {**_CLOSES, **_NEAR_GREEN}, True),
     ("far_away", "close_gripper", {**_CLOSES, "tcp": (0.0, 0.5, 0.246)}, False),
     ("too_fast", "close_gripper", {**_CLOSES, "tcp_speed": 0.081}, False),
     ("reached", "reach", {"tcp": (0.0, 0.5149, 0.145)}, True),
@@ -67,12 +64,7 @@ class ConditionsTest(parameterized.TestCase):
     ("not_lifted", "lift", {"blue": (0.0, 0.5, 0.2049)}, False),
     ("moves", "move_object", {"blue_speed": 0.051}, True),
     ("too_slow", "move_object", {"blue_speed": 0.049}, False),
-    (
-      "jerks",
-      "move_object",
-      {"blue_speed": 0.1, "blue_acceleration": 5.1},
-      False,
-    ),
+    ("jerks", "move_object", _JERKS, False),
   )
   def test_condition(self, task, changes, expected):
     self.assertIs(GOALS[task].condition(state(**changes)), expected)
