@@ -126,6 +126,12 @@ def chosen(agent, observations: np.ndarray) -> list[int]:
   return tasks
 
 
+def among(rows, *arrays: np.ndarray) -> list[bool]:
+  """Which rows are rows of one of the arrays."""
+  known = {row.tobytes() for array in arrays for row in array}
+  return [row.tobytes() in known for row in np.asarray(rows)]
+
+
 def states(module: torch.nn.Module) -> dict[str, torch.Tensor]:
   """A copy of all parameters and buffers."""
   return {name: value.clone() for name, value in module.state_dict().items()}

@@ -135,33 +135,26 @@ class BatchTest(absltest.TestCase):
     agent = make_agent(**{"reward.final_share": 0.5})
     expert = agent.batches.draw(0).expert
     for index, part in enumerate(fixtures.demonstrations().values()):
-      finals = {row.tobytes() for row in part.observation[part.is_last]}
-      found = [row.tobytes() in finals for row in expert.inputs[index].numpy()]
+      finals = part.observation[part.is_last]
+      found = fixtures.among(expert.inputs[index], finals)
       self.assertEqual(found, [False] * 16 + [True] * 16)
 
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
     agent = make_agent(
       **{"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}
     )
-    rows = {
-      row.tobytes()
-      for part in fixtures.demonstrations().values()
-      for row in part.observation
-    }
+    shown = [part.observation for part in fixtures.demonstrations().values()]
     for updates, expected in ((0, 8), (1, 4), (9, 0)):
       batch = agent.batches.draw(updates).batch
-      found = [row.tobytes() in rows for row in batch.inputs.numpy()]
+      found = fixtures.among(batch.inputs, *shown)
       self.assertEqual(sum(found), expected)
 
   def test_masked_floats_earn_nothing_at_either_scale(self):
     fields = {"reward.input": "state", "inputs.tanh_feature_scale": 0.1}
     agent = make_agent(**fields, **{"reward.masked": "1:3"})
-    raw, action = torch.zeros(1, OBS), torch.zeros(1, A)
-    standardiser = agent.learner.networks.intentions.standardiser
-    rewards = [agent.learner.reward.rewards(standardiser(raw), action)]
-    for at in (2, 3):
-      raw[:, at] = 1.0
-      rewards.append(agent.learner.reward.rewards(standardiser(raw), action))
+    raw = torch.stack([torch.zeros(OBS), *torch.eye(OBS)[[2, 3]]])
+    inputs = agent.learner.networks.intentions.standardiser(raw)
+    rewards = agent.learner.reward.rewards(inputs, torch.zeros(3, A)).T
     torch.testing.assert_close(rewards[1], rewards[0])
     self.assertFalse(torch.equal(rewards[2], rewards[0]))
     with self.assertRaisesRegex(ValueError, "5:7; the observation has 6"):

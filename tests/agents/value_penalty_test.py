@@ -60,8 +60,7 @@ class BoundsTest(absltest.TestCase):
 
   def test_of_examples(self):
     bounds = ExampleBounds(2, 50, 0.99, _CPU)
-    own = torch.tensor([[False, True, True], [False, False, False]])
-    own[1, 0] = True
+    own = torch.tensor([[False, True, True], [True, False, False]])
     value = torch.tensor([[0.0, 2.0, 4.0], [1.0, 5.0, 5.0]])
     reward = 0.1 * (2.0 * own.float() - 1.0)
     low, high = bounds(reward, value)
