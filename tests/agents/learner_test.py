@@ -37,9 +37,7 @@ class WhatMovesTest(parameterized.TestCase):
   @parameterized.product(
     trunk=("shared", "own"), layout=("shared_trunk", "separate")
   )
-  def test_the_intention_loss_trains_heads_and_its_own_trunk(
-    self, trunk, layout
-  ):
+  def test_the_intention_loss_trains_heads_and_own_trunk(self, trunk, layout):
     fields = {"networks.actor_trunk": trunk, "networks.layout": layout}
     learner = make_learner(**STILL, **fields)
     networks = learner.networks
@@ -54,9 +52,8 @@ class WhatMovesTest(parameterized.TestCase):
     self.assertEqual("trunk.first.weight" in moved, has_own)
 
   def test_target_moves_by_polyak_trunk_included(self):
-    learner = make_learner(
-      **{"critic.polyak": 0.25, "critic.learning_rate": 0.01}
-    )
+    fields = {"critic.polyak": 0.25, "critic.learning_rate": 0.01}
+    learner = make_learner(**fields)
     before = fixtures.states(learner.networks.target_critics)
     learner.update(_draw())
     online = learner.networks.critics.state_dict()

@@ -51,15 +51,12 @@ class LearningTest(parameterized.TestCase):
   )
   def test_discriminator_learns_and_all_stays_finite(self, tasks, fields):
     agent = make_agent(tasks, **_LEARNING, **fields)
-    early, _, late = (
-      fixtures.train(agent, updates) for updates in (5, 200, 20)
-    )
+    early, _, late = (fixtures.train(agent, n) for n in (5, 200, 20))
     for task in tasks:
       self.assertGreater(late[f"accuracy_expert/{task}"], 0.9)
       self.assertGreater(late[f"accuracy_policy/{task}"], 0.65)
-      self.assertGreater(
-        late[f"logit_expert/{task}"], late[f"logit_policy/{task}"] + 1
-      )
+      apart = late[f"logit_expert/{task}"] - late[f"logit_policy/{task}"]
+      self.assertGreater(apart, 1.0)
     self.assertLess(late["loss/discriminator"], early["loss/discriminator"])
     off = ("scheduler/", "loss/value", "value_", "distance")
     for name, value in late.items():
@@ -89,14 +86,12 @@ class ContractTest(parameterized.TestCase):
     chosen = fixtures.chosen(agent, np.zeros((20, OBS), np.float32))
     for start in range(0, 20, 5):
       self.assertLen(set(chosen[start : start + 5]), 1)
-    self.assertAlmostEqual(
-      agent._scheduler.temperature, 360 * 0.9995**4, places=6
-    )
+    temperature = agent._scheduler.temperature
+    self.assertAlmostEqual(temperature, 360 * 0.9995**4, places=6)
 
   def test_scheduler_learns_the_main_tasks_discounted_return(self):
-    agent = make_agent(
-      **{"critic.discount": 0.5, "scheduler.phi": 1.0, "scheduler.xi": 10}
-    )
+    periods = {"scheduler.phi": 1.0, "scheduler.xi": 10}
+    agent = make_agent(**{"critic.discount": 0.5}, **periods)
     rows = synthetic.transitions(20, OBS, A, seed=5)
     chosen = fixtures.chosen(agent, rows.observation)
     agent.end_episode(Episode(rows.observation, rows.action))
@@ -106,17 +101,15 @@ class ContractTest(parameterized.TestCase):
     self.assertAlmostEqual(value, expected, places=5)
 
   def test_stored_policy_acts_like_the_agents(self):
-    agent = make_agent(
-      **{"inputs.standardise": True, "inputs.tanh_feature_scale": 0.1}
-    )
+    inputs = {"inputs.standardise": True, "inputs.tanh_feature_scale": 0.1}
+    agent = make_agent(**inputs)
     _live(agent)
     folder = self.create_tempdir().full_path
     agent.save_policy(folder, {}, env_step=0)
     stored = Policy.load(folder)
     rows = synthetic.transitions(3, OBS, A).observation
-    np.testing.assert_array_equal(
-      stored.act(rows, "lift"), agent.policy.act(rows, "lift")
-    )
+    acts = agent.policy.act(rows, "lift")
+    np.testing.assert_array_equal(stored.act(rows, "lift"), acts)
 
   def test_wrong_sizes_are_refused(self):
     shown = fixtures.demonstrations(TASKS, OBS + 1)
@@ -140,9 +133,8 @@ class BatchTest(absltest.TestCase):
       self.assertEqual(found, [False] * 16 + [True] * 16)
 
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
-    agent = make_agent(
-      **{"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}
-    )
+    share = {"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}
+    agent = make_agent(**share)
     shown = [part.observation for part in fixtures.demonstrations().values()]
     for updates, expected in ((0, 8), (1, 4), (9, 0)):
       batch = agent.batches.draw(updates).batch

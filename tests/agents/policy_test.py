@@ -45,10 +45,8 @@ class ActingTest(absltest.TestCase):
   def test_mean_action_of_the_standardised_observation(self):
     policy, row = _policy(), _observation()
     arrays = policy.arrays()
-    inputs = (row - arrays["standardiser.mean"]) / (
-      arrays["standardiser.deviation"]
-    )
-    features = inputs
+    features = row - arrays["standardiser.mean"]
+    features /= arrays["standardiser.deviation"]
     for layer in ("first", "second"):
       weight, bias = (arrays[f"trunk.{layer}.{n}"] for n in ("weight", "bias"))
       features = np.maximum(weight @ features + bias, 0)
@@ -56,9 +54,9 @@ class ActingTest(absltest.TestCase):
     hidden = np.maximum(hidden + arrays["heads.hidden.bias"][1, 0], 0)
     output = hidden @ arrays["heads.output.weight"][1]
     output = output + arrays["heads.output.bias"][1, 0]
-    np.testing.assert_allclose(
-      policy.act(row, "first"), np.tanh(output[:A]), rtol=1e-4, atol=1e-5
-    )
+    expected = np.tanh(output[:A])
+    found = policy.act(row, "first")
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
 
   def test_samples_follow_from_the_seed_and_surround_the_mean(self):
     policy, row = _policy(), _observation()
@@ -69,13 +67,10 @@ class ActingTest(absltest.TestCase):
     second = [policy.act(row) for _ in range(2)]
     np.testing.assert_array_equal(first, second)
     self.assertGreater(np.abs(first[0] - first[1]).max(), 1e-4)
-    many = policy.act(
-      np.repeat(row[None], 4000, 0), generator=np.random.default_rng(0)
-    )
-    median = np.median(many, axis=0)
-    np.testing.assert_allclose(
-      median, policy.act(row, deterministic=True), atol=0.05
-    )
+    rows = np.repeat(row[None], 4000, 0)
+    many = policy.act(rows, generator=np.random.default_rng(0))
+    mean = policy.act(row, deterministic=True)
+    np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
 
   def test_unknown_task_is_refused_with_the_valid_ones(self):
     policy = _policy()
@@ -98,9 +93,8 @@ class StoredTest(FolderTest):
     policy.save(self.folder, {"seed": 7})
     loaded = Policy.load(self.folder)
     self.assertEqual(loaded.tasks, TASKS)
-    np.testing.assert_array_equal(
-      loaded.act(rows, "first"), policy.act(rows, "first")
-    )
+    acts = policy.act(rows, "first")
+    np.testing.assert_array_equal(loaded.act(rows, "first"), acts)
     config = json.loads((self.folder / "config.json").read_text())
     self.assertEqual(config["seed"], 7)
 

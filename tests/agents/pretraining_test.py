@@ -37,9 +37,8 @@ class PretrainingTest(parameterized.TestCase):
     self.assertEqual(agent.learner.updates, 0)
 
   def test_intentions_and_temperatures_wait_for_the_critics(self):
-    agent = make_agent(
-      **{"critic.warmup_updates": 2, "intention.learning_rate": 1e-3}
-    )
+    rate = {"intention.learning_rate": 1e-3}
+    agent = make_agent(**rate, **{"critic.warmup_updates": 2})
     networks = agent.learner.networks
     heads = states(networks.intentions.heads)
     critics = states(networks.critics)
@@ -114,9 +113,8 @@ class PriorTest(parameterized.TestCase):
       loss, found = prior(inputs, mean, std, q)
       losses.append(loss.item())
     by_hand = 2.0 * 3.0 * found["distance_from_prior"].sum().item()
-    np.testing.assert_allclose(
-      losses, [by_hand, by_hand / 2, by_hand / 4], rtol=1e-5
-    )
+    expected = [by_hand, by_hand / 2, by_hand / 4]
+    np.testing.assert_allclose(losses, expected, rtol=1e-5)
 
   def test_too_high_a_target_entropy_is_reported_by_task(self):
     for std, tasks in ((0.01, list(TASKS)), (1.0, [])):
@@ -142,9 +140,8 @@ class PriorTest(parameterized.TestCase):
     with torch.no_grad():
       network.heads.output.weight[..., :A] = 0.0
       network.heads.output.bias[..., :A] = 0.0
-    found = entropies(
-      network, torch.zeros(len(TASKS), 20_000, OBS), torch.Generator()
-    )
+    rows = torch.zeros(len(TASKS), 20_000, OBS)
+    found = entropies(network, rows, torch.Generator())
     # A Gaussian's, 0.5 ln(2 pi e) + ln 0.01 a float; the tanh is straight here.
     by_hand = A * (1.418939 - 4.605170)
     np.testing.assert_allclose(found, by_hand, atol=0.02)

@@ -121,9 +121,8 @@ class ExamplesTest(absltest.TestCase):
       part = shown[TASKS[index]]
       finals = part.next_observation[part.is_last]
       self.assertTrue(*fixtures.among(row[None], finals))
-    torch.testing.assert_close(
-      draw.batch.inputs[32:], draw.batch.next_inputs[32:]
-    )
+    examples = draw.batch.inputs[32:]
+    torch.testing.assert_close(draw.batch.next_inputs[32:], examples)
 
   def test_noise_is_in_the_tasks_own_stds(self):
     generator = np.random.default_rng(0)
@@ -186,12 +185,9 @@ class ExamplesTest(absltest.TestCase):
       )
       agent.learner.update(draw._replace(batch=batch))
       networks = agent.learner.networks
-      found.append(
-        [
-          networks.critics.heads.output.weight[[0, 3]].clone(),
-          networks.intentions.heads.output.weight[0].clone(),
-        ]
-      )
+      critics = networks.critics.heads.output.weight
+      intentions = networks.intentions.heads.output.weight
+      found.append([critics[[0, 3]].clone(), intentions[0].clone()])
     torch.testing.assert_close(*found)
 
   def test_values_of_examples_rise_above_the_rest(self):

@@ -22,6 +22,9 @@ NAMES = (
 )
 
 
+STACK = task_names.task_set("stack")
+
+
 class _Scripted:
   """Stands in for a generator: `choice` follows a script."""
 
@@ -37,11 +40,7 @@ def _table(tasks, generator, **fields):
   return QTable(tasks, generator, QTableConfig(**fields))
 
 
-def _make(name, main="stack", seed=0):
-  return _of(name, task_names.task_set(main), seed)
-
-
-def _of(name, tasks, seed=0):
+def _make(name, tasks=STACK, seed=0):
   config = fixtures.config(**{"scheduler.kind": name}).scheduler
   return schedulers.make_scheduler(config, tasks, np.random.default_rng(seed))
 
@@ -85,9 +84,8 @@ class QTableTest(absltest.TestCase):
     np.testing.assert_allclose(found, [1.0, 0.0])
 
   def test_temperature_falls_at_every_choice_down_to_the_minimum(self):
-    table = _table(
-      2, np.random.default_rng(0), temperature=360, decay=0.5, minimum=100
-    )
+    cooling = {"temperature": 360, "decay": 0.5, "minimum": 100}
+    table = _table(2, np.random.default_rng(0), **cooling)
     table.begin_episode()
     seen = []
     for _ in range(3):
@@ -135,7 +133,7 @@ class ConditionalTest(parameterized.TestCase):
     self.assertAlmostEqual(table[row, tasks.index(following)], expected)
 
   def test_uses_the_row_of_the_last_choice(self):
-    table = conditional.table_for(task_names.task_set("stack"))
+    table = conditional.table_for(STACK)
     scheduler = _make("conditional_weighted")
     for _ in range(2):
       scheduler.begin_episode()
@@ -153,9 +151,10 @@ class FactoryTest(parameterized.TestCase):
     name=NAMES, main=(*task_names.MAIN_TASKS, "move_object")
   )
   def test_same_seed_same_choices_and_state_round_trip(self, name, main):
-    first, second = _make(name, main), _make(name, main)
+    tasks = task_names.task_set(main)
+    first, second = _make(name, tasks), _make(name, tasks)
     self.assertEqual(_play(first), _play(second))
-    third = _make(name, main, seed=7)
+    third = _make(name, tasks, seed=7)
     third.load_state_dict(fixtures.reloaded(first.state_dict()))
     self.assertEqual(_play(first), _play(third))
 
@@ -172,7 +171,7 @@ class FactoryTest(parameterized.TestCase):
 
   def test_single_task_is_always_chosen(self):
     for name in ("q_table", "weighted_random", "main_only", "uniform"):
-      scheduler = _of(name, ("a",))
+      scheduler = _make(name, ("a",))
       scheduler.begin_episode()
       self.assertEqual(scheduler.next_task(), 0)
 
@@ -194,7 +193,7 @@ class HandcraftedTest(parameterized.TestCase):
     self.assertIn(tuple(map(tasks.index, one.split())), sequences)
 
   def test_half_of_the_episodes_follow_a_sequence(self):
-    sequences = handcrafted.sequences_for(task_names.task_set("stack"))
+    sequences = handcrafted.sequences_for(STACK)
     played = _play(_make("weighted_random_handcrafted"), 400)
     followed = sum(tuple(episode) in sequences for episode in played)
     self.assertAlmostEqual(followed / 400, 0.5, delta=0.1)
