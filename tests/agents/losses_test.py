@@ -219,7 +219,6 @@ class RewardsTest(parameterized.TestCase):
     self.assertTrue((reward.diff() > 0).all())
 
   def test_clip_comes_before_scale(self):
-    reward = rewards.reward_from_logits(
-      torch.tensor([-9.0, 9.0]), clip=5.0, scale=0.1
-    )
+    logits = torch.tensor([-9.0, 9.0])
+    reward = rewards.reward_from_logits(logits, clip=5.0, scale=0.1)
     torch.testing.assert_close(reward, torch.tensor([-0.5, 0.5]))

@@ -152,7 +152,6 @@ class StandardiserTest(absltest.TestCase):
     standardiser = Standardiser(2, tanh_feature_scale=0.01)
     result = standardiser(torch.tensor([[0.002, -1.0]]))
     # tanh(0.2) = 0.197375.
-    torch.testing.assert_close(
-      result, torch.tensor([[0.002, -1.0, 0.197375, -1.0]])
-    )
+    expected = torch.tensor([[0.002, -1.0, 0.197375, -1.0]])
+    torch.testing.assert_close(result, expected)
     self.assertEqual(standardiser.input_size, 4)

@@ -45,12 +45,10 @@ class GymnasiumTest(parameterized.TestCase):
     timestep = own.reset()
     random = np.random.default_rng(0)
     for step in range(20):
-      np.testing.assert_array_equal(
-        observation, lfgp_dmc.flatten(timestep.observation)
-      )
-      self.assertEqual(
-        info["successes"], lfgp_dmc.successes(timestep.observation)
-      )
+      flat = lfgp_dmc.flatten(timestep.observation)
+      np.testing.assert_array_equal(observation, flat)
+      successes = lfgp_dmc.successes(timestep.observation)
+      self.assertEqual(info["successes"], successes)
       action = random.uniform(-1, 1, 4).astype(np.float32)
       observation, reward, terminated, truncated, info = env.step(action)
       timestep = own.step(action)

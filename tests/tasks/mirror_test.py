@@ -99,13 +99,11 @@ class MirrorTest(parameterized.TestCase):
     both = mirror.with_images({"stack": shown, "move_object": shown})
     self.assertIs(both["move_object"], shown)
     found = both["stack"]
-    self.assertEqual(
-      found.episode.tolist(), [0, 0, 0, 1, 1, 2, 3, 3, 3, 4, 4, 5]
-    )
+    episode = [0, 0, 0, 1, 1, 2, 3, 3, 3, 4, 4, 5]
+    self.assertEqual(found.episode.tolist(), episode)
     np.testing.assert_array_equal(found.is_last, np.tile(shown.is_last, 2))
     np.testing.assert_array_equal(found.action[6:, 1], -shown.action[:, 1])
     np.testing.assert_array_equal(found.observation[:6], shown.observation)
-    np.testing.assert_array_equal(
-      found.next_observation[6:], mirror.observation(shown.next_observation)
-    )
+    images = mirror.observation(shown.next_observation)
+    np.testing.assert_array_equal(found.next_observation[6:], images)
     self.assertEmpty(demonstration_checks.of_arrays(found.arrays(), None, None))
