@@ -5,6 +5,9 @@ makes it again on the memory of the recording. Whatever was a Python number when
 it was recorded stays what it was.
 """
 
+import collections
+import itertools
+
 import torch
 from absl.testing import parameterized
 from torch.utils._python_dispatch import TorchDispatchMode
@@ -55,32 +58,29 @@ class TapeRecorder:
   """A recorder that counts what it is used for."""
 
   def __init__(self):
-    self.warm_ups = self.replays = self.records = 0
+    self.counts = collections.Counter()
 
   def warm_up(self, update):
-    self.warm_ups += 1
+    self.counts["warm-ups"] += 1
     return update()
 
   def record(self, update):
     """A tape, unlike a graph, makes the update: the first replay is that."""
-    self.records += 1
-    has_replayed = False
+    self.counts["records"] += 1
     with Tape() as tape:
       metrics = update()
+    replays = itertools.chain([lambda: None], itertools.repeat(tape.replay))
 
     def replay():
-      nonlocal has_replayed
-      self.replays += 1
-      if has_replayed:
-        tape.replay()
-      has_replayed = True
+      self.counts["replays"] += 1
+      next(replays)()
 
     return metrics, replay
 
 
 class RecordingTest(parameterized.TestCase):
   def _compare(self, updates, bfloat16=False, **fields):
-    """Makes the same updates twice; returns the recorder."""
+    """Makes the same updates twice; returns what was recorded."""
     fields = {"scheduler.kind": "weighted_random", **fields}
     agents = [fixtures.make_agent(bfloat16=bfloat16, **fields) for _ in "ab"]
     recorder = TapeRecorder()
@@ -100,7 +100,7 @@ class RecordingTest(parameterized.TestCase):
       strict=True,
     ):
       self.assertEmpty(fixtures.moved(fixtures.states(one), other))
-    return recorder
+    return recorder.counts
 
   @parameterized.parameters(
     {},
@@ -118,16 +118,13 @@ class RecordingTest(parameterized.TestCase):
     {"reward.main_masked": "0:2"},
   )
   def test_replays_are_the_updates(self, **fields):
-    recorder = self._compare(12, **fields)
-    self.assertEqual((recorder.records, recorder.replays), (1, 9))
+    counts = self._compare(12, **fields)
+    self.assertEqual(counts, {"warm-ups": 3, "records": 1, "replays": 9})
 
   def test_each_phase_has_a_recording(self):
-    recorder = self._compare(
-      30, **{"critic.warmup_updates": 15, "reward.every": 2}
-    )
-    self.assertEqual(recorder.records, 4)
-    self.assertEqual(recorder.warm_ups, 12)
-    self.assertEqual(recorder.replays, 18)
+    phases = {"critic.warmup_updates": 15, "reward.every": 2}
+    counts = self._compare(30, **phases)
+    self.assertEqual(counts, {"warm-ups": 12, "records": 4, "replays": 18})
 
   def test_the_tape_refuses_what_waits_for_the_device(self):
     value = torch.arange(3.0)

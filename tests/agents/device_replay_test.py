@@ -26,9 +26,8 @@ class DeviceReplayTest(absltest.TestCase):
 
   def _check(self):
     indices = np.arange(len(self.replay))[::-1].copy()
-    for one, other in zip(
-      self.rows.gather(indices), self.replay.gather(indices), strict=True
-    ):
+    both = (self.rows.gather(indices), self.replay.gather(indices))
+    for one, other in zip(*both, strict=True):
       np.testing.assert_array_equal(one.numpy(), other)
 
   def test_follows_additions_also_around_the_ring(self):

@@ -17,8 +17,6 @@ from lfgp_dmc.agents.batches import Batch
 from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import LfgpConfig
-from lfgp_dmc.agents.lfgp.builder import make_learner as build_learner
-from lfgp_dmc.agents.lfgp.networks import make_networks
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics, pytree
@@ -48,12 +46,15 @@ def config(**fields: Any) -> LfgpConfig:
 
 
 def demonstrations(
-  tasks: Sequence[str] = TASKS, pairs: int = 100, attempt: int = 20, **sizes
+  tasks: Sequence[str] = TASKS,
+  observations: int = OBS,
+  actions: int = A,
+  pairs: int = 100,
+  attempt: int = 20,
 ):
   """Of each task, by `synthetic.demonstrations`."""
-  shape = (sizes.get("observations", OBS), sizes.get("actions", A))
-  seed = sizes.get("seed", 0)
-  return synthetic.demonstrations(tasks, pairs, *shape, seed, attempt)
+  sizes = (pairs, observations, actions)
+  return synthetic.demonstrations(tasks, *sizes, attempt=attempt)
 
 
 def make_agent(
@@ -62,51 +63,23 @@ def make_agent(
   *,
   shown=None,
   replay=None,
-  observations: int = OBS,
-  actions: int = A,
+  sizes: tuple[int, int] = (OBS, A),
   bfloat16: bool = False,
   **fields: Any,
 ):
   """A small LfGP agent on made-up data; `fields`: of `config`."""
   if shown is None:
-    sizes = {"observations": observations, "actions": actions}
-    shown = demonstrations(tasks, **sizes)
+    shown = demonstrations(tasks, *sizes)
   if replay is None:
-    rows = synthetic.transitions(200, observations, actions)
-    replay = synthetic.replay(rows)
-  return lfgp.build(
-    config(**fields),
-    tasks,
-    shown,
-    replay,
-    seed,
-    "cpu",
-    observations,
-    actions,
-    bfloat16=bfloat16,
-  )
-
-
-def make_learner(
-  tasks: Sequence[str] = TASKS,
-  *,
-  observations: int = OBS,
-  actions: int = A,
-  dtype: torch.dtype = torch.float32,
-  **fields: Any,
-):
-  """Networks and their learner without data; `fields`: of `config`."""
+    replay = synthetic.replay(synthetic.transitions(200, *sizes))
   settings = config(**fields)
-  networks = make_networks(
-    settings,
-    len(tasks),
-    actions,
-    Standardiser(observations),
-    torch.Generator().manual_seed(1),
-    torch.device("cpu"),
-  )
-  noise = torch.Generator().manual_seed(2)
-  return build_learner(settings, networks, noise, dtype)
+  fixed = (tasks, shown, replay, seed, "cpu", *sizes)
+  return lfgp.build(settings, *fixed, bfloat16=bfloat16)
+
+
+def make_learner(*args: Any, **fields: Any):
+  """That of `make_agent`."""
+  return make_agent(*args, **fields).learner
 
 
 def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
@@ -125,16 +98,38 @@ def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
   )
 
 
-def pool(**sizes) -> ExpertPool:
+def pool() -> ExpertPool:
   """The experts of `TASKS`."""
-  return ExpertPool(demonstrations(**sizes), TASKS, Standardiser(OBS))
+  return ExpertPool(demonstrations(), TASKS, Standardiser(OBS))
 
 
-def batch(rows: int = B, seed: int = 0) -> Batch:
+def batch(rows: int = B, seed: int = 0, sizes=(OBS, A)) -> Batch:
   """Transitions."""
-  return Batch(
-    *map(torch.from_numpy, synthetic.transitions(rows, OBS, A, seed))
-  )
+  made = synthetic.transitions(rows, *sizes, seed)
+  return Batch(*map(torch.from_numpy, made))
+
+
+def train(agent, updates: int) -> dict[str, float]:
+  """Makes so many updates; their metrics."""
+  for _ in range(updates):
+    agent.update()
+  return agent.metrics()
+
+
+def chosen(agent, observations: np.ndarray) -> list[int]:
+  """Acts through an episode: the indices of the scheduled tasks."""
+  agent.begin_episode()
+  tasks = []
+  for row in observations:
+    agent.act(row)
+    tasks.append(agent.tasks.index(agent._task))
+  return tasks
+
+
+def among(rows, *arrays: np.ndarray) -> list[bool]:
+  """Which rows are rows of one of the arrays."""
+  known = {row.tobytes() for array in arrays for row in array}
+  return [row.tobytes() in known for row in np.asarray(rows)]
 
 
 def states(module: torch.nn.Module) -> dict[str, torch.Tensor]:
@@ -166,17 +161,10 @@ def make_toy_agent(
   seed: int, rows: int, shown=None, reward_tasks: Sequence[str] = (), **fields
 ):
   """An agent for the toy world, and its empty replay."""
-  observations, actions = environments.widths(toy.PointEnvironment())
-  replay = Replay(rows, observations, actions, reward_tasks=reward_tasks)
-  agent = make_agent(
-    toy.TASKS,
-    seed,
-    shown=shown or {},
-    replay=replay,
-    observations=observations,
-    actions=actions,
-    **{"networks.hidden_size": 32, **fields},
-  )
+  sizes = environments.widths(toy.PointEnvironment())
+  replay = Replay(rows, *sizes, reward_tasks=reward_tasks)
+  fields = {"networks.hidden_size": 32, "replay": replay, **fields}
+  agent = make_agent(toy.TASKS, seed, shown=shown or {}, sizes=sizes, **fields)
   return agent, replay
 
 

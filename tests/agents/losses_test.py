@@ -109,11 +109,11 @@ class PolicyLossesTest(absltest.TestCase):
     )
     self.assertAlmostEqual(weighted.item(), 2.5, places=6)
 
-  def test_likelihood_by_hand_and_by_a_library(self):
+  def test_likelihood_by_hand(self):
     # atanh(0.5) = 0.549306; std 0.5; normal density, Jacobian 1 - 0.25.
     mean, std = torch.tensor([[[0.3]]]), torch.tensor([[[0.5]]])
     action = torch.tensor([[[0.5]]])
-    loss, metrics = behaviour_cloning.likelihood_loss(mean, std, action)
+    loss, _ = behaviour_cloning.likelihood_loss(mean, std, action)
     by_hand = (
       0.5 * ((0.549306 - 0.3) / 0.5) ** 2
       + math.log(0.5)
@@ -121,12 +121,6 @@ class PolicyLossesTest(absltest.TestCase):
       + math.log(0.75)
     )
     self.assertAlmostEqual(loss.item(), by_hand, places=5)
-    squashed = torch.distributions.TransformedDistribution(
-      torch.distributions.Normal(mean, std),
-      [torch.distributions.TanhTransform()],
-    )
-    expected = -squashed.log_prob(action).sum(-1).mean(-1)
-    torch.testing.assert_close(metrics["behaviour_cloning"], expected)
 
   def test_likelihood_weighs_errors_where_the_expert_is_precise(self):
     mean = torch.zeros(1, 2, 1, requires_grad=True)
@@ -149,7 +143,7 @@ class PolicyLossesTest(absltest.TestCase):
     )
     torch.testing.assert_close(low, loss)
 
-  def test_divergence_by_hand_and_by_a_library(self):
+  def test_divergence_by_hand(self):
     mean = torch.tensor([[[0.3, 0.0]], [[0.0, 0.0]]])
     std = torch.tensor([[[0.2, 1.0]], [[0.1, 0.3]]])
     prior_mean = torch.tensor([[[0.1, 0.0]], [[0.0, 0.0]]])
@@ -162,13 +156,6 @@ class PolicyLossesTest(absltest.TestCase):
       metrics["behaviour_cloning"], torch.tensor([by_hand, 0.0])
     )
     self.assertAlmostEqual(loss.item(), 2.0 * by_hand, places=5)
-    expected = torch.distributions.kl_divergence(
-      torch.distributions.Normal(mean, std),
-      torch.distributions.Normal(prior_mean, prior_std),
-    )
-    torch.testing.assert_close(
-      metrics["behaviour_cloning"], expected.sum(-1).mean(-1)
-    )
 
   def test_divergence_from_a_prior_that_is_very_precise(self):
     # Means: (0.009 / 0.018)^2 = 0.25. Deviations: as precise as the prior, then
@@ -232,7 +219,6 @@ class RewardsTest(parameterized.TestCase):
     self.assertTrue((reward.diff() > 0).all())
 
   def test_clip_comes_before_scale(self):
-    reward = rewards.reward_from_logits(
-      torch.tensor([-9.0, 9.0]), clip=5.0, scale=0.1
-    )
+    logits = torch.tensor([-9.0, 9.0])
+    reward = rewards.reward_from_logits(logits, clip=5.0, scale=0.1)
     torch.testing.assert_close(reward, torch.tensor([-0.5, 0.5]))

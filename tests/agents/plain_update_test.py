@@ -7,8 +7,8 @@ import torch
 from absl.testing import parameterized
 from torch.nn import functional
 
-from lfgp_dmc.agents import synthetic
-from lfgp_dmc.agents.batches import Batch, Draw
+from lfgp_dmc import seeding
+from lfgp_dmc.agents.batches import Draw
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from tests.agents import fixtures
@@ -28,8 +28,7 @@ def _learner(**fields):
   )
   learner = fixtures.make_learner(
     TASKS,
-    observations=OBS,
-    actions=A,
+    sizes=(OBS, A),
     **{
       "batch_size": B,
       "intention.initial_temperature": 0.3,
@@ -46,8 +45,12 @@ def _learner(**fields):
   return learner
 
 
-def _layer(inputs, weight, bias):
-  return inputs @ weight + bias
+def _linear(inputs, layer):
+  return functional.linear(inputs, layer.weight, layer.bias)
+
+
+def _own(inputs, layer, k):
+  return inputs @ layer.weight[k] + layer.bias[k]
 
 
 class Plain:
@@ -59,20 +62,16 @@ class Plain:
 
   def discriminator(self, pairs):
     n = self.networks.discriminator
-    first = torch.tanh(functional.linear(pairs, n.first.weight, n.first.bias))
-    second = torch.tanh(
-      functional.linear(first, n.second.weight, n.second.bias)
-    )
-    return functional.linear(second, n.output.weight, n.output.bias)
+    hidden = torch.tanh(_linear(pairs, n.first))
+    return _linear(torch.tanh(_linear(hidden, n.second)), n.output)
 
   def discriminator_loss(self, policy, expert):
     share = torch.rand((K, N, policy.shape[1]), generator=self.noise)
     loss, norms = 0.0, []
     for k in range(K):
-      loss += 0.5 * functional.softplus(self.discriminator(policy)[:, k]).mean()
-      loss += (
-        0.5 * functional.softplus(-self.discriminator(expert[k])[:, k]).mean()
-      )
+      for sign, pairs in ((1, policy), (-1, expert[k])):
+        logits = self.discriminator(pairs)[:, k]
+        loss += 0.5 * functional.softplus(sign * logits).mean()
       mixed = share[k] * policy[:N] + (1 - share[k]) * expert[k]
       mixed.requires_grad_()
       (gradient,) = torch.autograd.grad(
@@ -85,7 +84,7 @@ class Plain:
     if not list(module.parameters()):
       return state
     for layer in (module.first, module.second):
-      state = torch.relu(functional.linear(state, layer.weight, layer.bias))
+      state = torch.relu(_linear(state, layer))
     return state
 
   def intention(self, k, state, noise):
@@ -93,8 +92,8 @@ class Plain:
     hidden = self.trunk(self.networks.intentions.trunk, state).detach()
     for layer in (heads.hidden, heads.second):
       if layer is not None:
-        hidden = torch.relu(_layer(hidden, layer.weight[k], layer.bias[k]))
-    out = _layer(hidden, heads.output.weight[k], heads.output.bias[k])
+        hidden = torch.relu(_own(hidden, layer, k))
+    out = _own(hidden, heads.output, k)
     mean, std = out[:, :A], functional.softplus(out[:, A:]) + 1e-7
     value = mean + std * noise
     density = torch.distributions.Normal(mean, std).log_prob(value)
@@ -105,15 +104,10 @@ class Plain:
     heads, g = critics.heads, twin * K + k
     features = self.trunk(critics.trunk, state)
     weight = torch.cat([heads.feature_weight[g], heads.action_weight[g]])
-    hidden = _layer(torch.cat([features, action], 1), weight, heads.bias[g])
+    hidden = torch.cat([features, action], 1) @ weight + heads.bias[g]
     if heads.second is not None:
-      hidden = _layer(
-        torch.relu(hidden), heads.second.weight[g], heads.second.bias[g]
-      )
-    out = _layer(
-      torch.relu(hidden), heads.output.weight[g], heads.output.bias[g]
-    )
-    return out[:, 0]
+      hidden = _own(torch.relu(hidden), heads.second, g)
+    return _own(torch.relu(hidden), heads.output, g)[:, 0]
 
   def critic_loss(self, batch):
     noise = torch.randn((K, B, A), generator=self.noise)
@@ -124,12 +118,10 @@ class Plain:
         alpha = self.networks.log_temperature[k].exp()
         action, log_prob = self.intention(k, batch.next_inputs, noise[k])
         value = torch.minimum(
-          self.q(target, 0, k, batch.next_inputs, action),
-          self.q(target, 1, k, batch.next_inputs, action),
+          *(self.q(target, i, k, batch.next_inputs, action) for i in range(2))
         )
-        reward = self.discriminator(torch.cat([batch.inputs, batch.action], 1))[
-          :, k
-        ]
+        pairs = torch.cat([batch.inputs, batch.action], 1)
+        reward = self.discriminator(pairs)[:, k]
         wanted = reward + GAMMA * (value - alpha * log_prob)
       for twin in range(2):
         q = self.q(critics, twin, k, batch.inputs, batch.action)
@@ -155,15 +147,12 @@ class PlainUpdateTest(parameterized.TestCase):
   def test_losses_and_gradients_equal_the_equations(self, **fields):
     learner = _learner(**fields)
     networks = learner.networks
-    batch, other = (
-      Batch(*map(torch.from_numpy, synthetic.transitions(B, OBS, A, seed)))
-      for seed in (0, 1)
-    )
-    pool = ExpertPool(
-      synthetic.demonstrations(TASKS, 60, OBS, A), TASKS, Standardiser(OBS)
-    )
+    batch, other = (fixtures.batch(B, seed, (OBS, A)) for seed in (0, 1))
+    shown = fixtures.demonstrations(TASKS, OBS, A)
+    pool = ExpertPool(shown, TASKS, Standardiser(OBS))
     expert = pool.sample(np.random.default_rng(0), N)
-    plain = Plain(networks, torch.Generator().manual_seed(2))
+    noise = torch.Generator().manual_seed(seeding.derive(0, "noise"))
+    plain = Plain(networks, noise)
     policy_pairs = torch.cat([other.inputs, other.action], 1)
     expert_pairs = torch.cat([expert.inputs, expert.action], 2)
     parts = {

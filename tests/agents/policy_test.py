@@ -45,10 +45,8 @@ class ActingTest(absltest.TestCase):
   def test_mean_action_of_the_standardised_observation(self):
     policy, row = _policy(), _observation()
     arrays = policy.arrays()
-    inputs = (row - arrays["standardiser.mean"]) / (
-      arrays["standardiser.deviation"]
-    )
-    features = inputs
+    features = row - arrays["standardiser.mean"]
+    features /= arrays["standardiser.deviation"]
     for layer in ("first", "second"):
       weight, bias = (arrays[f"trunk.{layer}.{n}"] for n in ("weight", "bias"))
       features = np.maximum(weight @ features + bias, 0)
@@ -56,9 +54,9 @@ class ActingTest(absltest.TestCase):
     hidden = np.maximum(hidden + arrays["heads.hidden.bias"][1, 0], 0)
     output = hidden @ arrays["heads.output.weight"][1]
     output = output + arrays["heads.output.bias"][1, 0]
-    np.testing.assert_allclose(
-      policy.act(row, "first"), np.tanh(output[:A]), rtol=1e-4, atol=1e-5
-    )
+    expected = np.tanh(output[:A])
+    found = policy.act(row, "first")
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-5)
 
   def test_samples_follow_from_the_seed_and_surround_the_mean(self):
     policy, row = _policy(), _observation()
@@ -69,13 +67,10 @@ class ActingTest(absltest.TestCase):
     second = [policy.act(row) for _ in range(2)]
     np.testing.assert_array_equal(first, second)
     self.assertGreater(np.abs(first[0] - first[1]).max(), 1e-4)
-    many = policy.act(
-      np.repeat(row[None], 4000, 0), generator=np.random.default_rng(0)
-    )
-    median = np.median(many, axis=0)
-    np.testing.assert_allclose(
-      median, policy.act(row, deterministic=True), atol=0.05
-    )
+    rows = np.repeat(row[None], 4000, 0)
+    many = policy.act(rows, generator=np.random.default_rng(0))
+    mean = policy.act(row, deterministic=True)
+    np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
 
   def test_unknown_task_is_refused_with_the_valid_ones(self):
     policy = _policy()
@@ -98,61 +93,58 @@ class StoredTest(FolderTest):
     policy.save(self.folder, {"seed": 7})
     loaded = Policy.load(self.folder)
     self.assertEqual(loaded.tasks, TASKS)
-    np.testing.assert_array_equal(
-      loaded.act(rows, "first"), policy.act(rows, "first")
-    )
+    acts = policy.act(rows, "first")
+    np.testing.assert_array_equal(loaded.act(rows, "first"), acts)
     config = json.loads((self.folder / "config.json").read_text())
     self.assertEqual(config["seed"], 7)
 
-  def test_missing_files_are_named(self):
+  def test_missing_and_damaged_files_are_named(self):
     _policy().save(self.folder)
-    (self.folder / "policy.safetensors").unlink()
-    with self.assertRaisesRegex(FileNotFoundError, "policy.safetensors is mis"):
-      Policy.load(self.folder)
-    with self.assertRaisesRegex(FileNotFoundError, "config.json is missing"):
-      Policy.load(self.folder.parent)
-
-  def test_damaged_arrays_are_named(self):
-    _policy().save(self.folder)
-    path = self.folder / "policy.safetensors"
-    path.write_bytes(path.read_bytes()[:-10])
-    with self.assertRaisesRegex(ValueError, "policy.safetensors: not readable"):
-      Policy.load(self.folder)
-
-  def test_damaged_config_is_named(self):
-    _policy().save(self.folder)
+    config = self.folder / "config.json"
+    arrays = self.folder / "policy.safetensors"
+    whole = config.read_text()
     for text in ("{", "[]", "{}", '{"policy": 3}'):
-      (self.folder / "config.json").write_text(text)
-      with self.assertRaisesRegex(ValueError, "config.json"):
-        Policy.load(self.folder)
+      config.write_text(text)
+      self._check_refused(ValueError, "config.json")
+    config.write_text(whole)
+    arrays.write_bytes(arrays.read_bytes()[:-10])
+    self._check_refused(ValueError, "policy.safetensors: not readable")
+    arrays.unlink()
+    self._check_refused(FileNotFoundError, "policy.safetensors is missing")
+    config.unlink()
+    self._check_refused(FileNotFoundError, "config.json is missing")
 
-  def test_arrays_that_do_not_fit_are_listed(self):
+  def _check_refused(self, error, message):
+    with self.assertRaisesRegex(error, message):
+      Policy.load(self.folder)
+
+  def test_arrays_and_options_that_do_not_fit_are_listed(self):
     policy = _policy()
     arrays, options = policy.arrays(), policy.options()
     del arrays["trunk.first.bias"]
     arrays["other"] = np.zeros(1, np.float32)
     arrays["trunk.second.bias"] = np.zeros(2, np.float32)
     arrays["trunk.first.weight"][0, 0] = np.nan
-    with self.assertRaises(ValueError) as caught:
-      Policy.from_arrays(arrays, options)
-    for fault in (
+    self._check_faults(
+      arrays,
+      options,
       "trunk.first.bias is missing",
       "other is not known",
       "trunk.second.bias has shape [2], not [8]",
       "trunk.first.weight holds numbers that are not finite",
-    ):
-      self.assertIn(fault, str(caught.exception))
-
-  def test_wrong_options_are_listed(self):
-    policy = _policy()
-    options = policy.options() | {"action_size": "3", "tasks": [], "scale": 1}
-    with self.assertRaises(ValueError) as caught:
-      Policy.from_arrays(policy.arrays(), options)
-    for fault in (
+    )
+    self._check_faults(
+      policy.arrays(),
+      options | {"action_size": "3", "tasks": [], "scale": 1},
       "policy.tasks is []; valid: ",
       "policy.action_size is '3'; valid: a valid integer",
       "unknown policy.scale",
-    ):
+    )
+
+  def _check_faults(self, arrays, options, *faults):
+    with self.assertRaises(ValueError) as caught:
+      Policy.from_arrays(arrays, options)
+    for fault in faults:
       self.assertIn(fault, str(caught.exception))
 
   def test_a_policy_stored_without_a_layout_has_a_trunk(self):

@@ -17,19 +17,14 @@ from tests.agents import fixtures
 from tests.agents.fixtures import OBS, TASKS, A, make_agent, states
 
 _OWN = {"networks.actor_trunk": "own"}
+_PRIOR = {"prior.distance": "divergence", "prior.weight": 0.1}
 
 
 class PretrainingTest(parameterized.TestCase):
   @parameterized.parameters("shared_trunk", "separate")
   def test_imitates_without_an_update(self, layout):
-    agent = make_agent(
-      **{
-        **_OWN,
-        "networks.layout": layout,
-        "pretraining.learning_rate": 3e-3,
-        "pretraining.updates": 300,
-      }
-    )
+    cloning = {"pretraining.learning_rate": 3e-3, "pretraining.updates": 300}
+    agent = make_agent(**_OWN, **cloning, **{"networks.layout": layout})
     part = fixtures.demonstrations()["reach"]
 
     def error():
@@ -42,14 +37,12 @@ class PretrainingTest(parameterized.TestCase):
     self.assertEqual(agent.learner.updates, 0)
 
   def test_intentions_and_temperatures_wait_for_the_critics(self):
-    agent = make_agent(
-      **{"critic.warmup_updates": 2, "intention.learning_rate": 1e-3}
-    )
+    rate = {"intention.learning_rate": 1e-3}
+    agent = make_agent(**rate, **{"critic.warmup_updates": 2})
     networks = agent.learner.networks
     heads = states(networks.intentions.heads)
     critics = states(networks.critics)
-    for _ in range(2):
-      agent.update()
+    fixtures.train(agent, 2)
     self.assertEmpty(fixtures.moved(heads, networks.intentions.heads))
     self.assertEqual(networks.log_temperature.tolist(), [0.0] * len(TASKS))
     self.assertIn("heads.bias", fixtures.moved(critics, networks.critics))
@@ -59,9 +52,8 @@ class PretrainingTest(parameterized.TestCase):
     self.assertNotEqual(networks.log_temperature[0].item(), 0.0)
 
   def test_cloned_intentions_get_the_std_of_the_config(self):
-    agent = make_agent(
-      **{**_OWN, "pretraining.updates": 1, "pretraining.std": 0.1}
-    )
+    cloning = {"pretraining.updates": 1, "pretraining.std": 0.1}
+    agent = make_agent(**_OWN, **cloning)
     agent.prepare()
     _, std = agent.learner.networks.intentions(torch.randn(7, OBS))
     torch.testing.assert_close(std, torch.full_like(std, 0.1))
@@ -95,19 +87,12 @@ class PriorTest(parameterized.TestCase):
   def test_keeps_intentions_near_their_start_on_replayed_rows(self, distance):
     distances = []
     for weight in (1e-6, 100.0):
-      agent = make_agent(
-        **{
-          **_OWN,
-          "intention.learning_rate": 1e-2,
-          "prior.distance": distance,
-          "prior.weight": weight,
-        }
-      )
+      prior = {"prior.distance": distance, "prior.weight": weight}
+      agent = make_agent(**_OWN, **prior, **{"intention.learning_rate": 1e-2})
       agent.prepare()
-      rows = torch.from_numpy(synthetic.transitions(50, OBS, A).observation)
+      rows = fixtures.batch(50).inputs
       start = agent.learner.networks.intentions(rows)[0].tanh()
-      for _ in range(50):
-        agent.update()
+      fixtures.train(agent, 50)
       now = agent.learner.networks.intentions(rows)[0].tanh()
       distances.append((now - start).square().sum(-1).mean().item())
       state = agent.state_dict()["learner"]["networks"]["prior"]
@@ -128,14 +113,12 @@ class PriorTest(parameterized.TestCase):
       loss, found = prior(inputs, mean, std, q)
       losses.append(loss.item())
     by_hand = 2.0 * 3.0 * found["distance_from_prior"].sum().item()
-    np.testing.assert_allclose(
-      losses, [by_hand, by_hand / 2, by_hand / 4], rtol=1e-5
-    )
+    expected = [by_hand, by_hand / 2, by_hand / 4]
+    np.testing.assert_allclose(losses, expected, rtol=1e-5)
 
   def test_too_high_a_target_entropy_is_reported_by_task(self):
-    fields = {"prior.distance": "divergence", "prior.weight": 0.1}
     for std, tasks in ((0.01, list(TASKS)), (1.0, [])):
-      agent = make_agent(**fields, **{"intention.target_entropy": -2.0})
+      agent = make_agent(**_PRIOR, **{"intention.target_entropy": -2.0})
       agent.learner.networks.intentions.heads.set_std(std)
       with mock.patch.object(logging, "warning") as warning:
         agent.prepare()
@@ -144,18 +127,12 @@ class PriorTest(parameterized.TestCase):
   def test_works_without_demonstrations(self):
     rows = synthetic.transitions(50, OBS, A)
     rewards = np.zeros((50, len(TASKS)), np.float32)
-    agent = make_agent(
-      shown={},
-      replay=synthetic.replay(rows, rewards, TASKS),
-      **{
-        "prior.distance": "divergence",
-        "prior.weight": 0.1,
-        "reward.kind": "stored",
-      },
-    )
+    replay = synthetic.replay(rows, rewards, TASKS)
+    stored = {"reward.kind": "stored", **_PRIOR}
+    agent = make_agent(shown={}, replay=replay, **stored)
     agent.prepare()
-    agent.update()
-    self.assertTrue(np.isfinite(agent.metrics()["distance_from_prior/stack"]))
+    metrics = fixtures.train(agent, 1)
+    self.assertTrue(np.isfinite(metrics["distance_from_prior/stack"]))
 
   def test_entropy_by_hand(self):
     network = make_agent().learner.networks.intentions
@@ -163,9 +140,8 @@ class PriorTest(parameterized.TestCase):
     with torch.no_grad():
       network.heads.output.weight[..., :A] = 0.0
       network.heads.output.bias[..., :A] = 0.0
-    found = entropies(
-      network, torch.zeros(len(TASKS), 20_000, OBS), torch.Generator()
-    )
+    rows = torch.zeros(len(TASKS), 20_000, OBS)
+    found = entropies(network, rows, torch.Generator())
     # A Gaussian's, 0.5 ln(2 pi e) + ln 0.01 a float; the tanh is straight here.
     by_hand = A * (1.418939 - 4.605170)
     np.testing.assert_allclose(found, by_hand, atol=0.02)
@@ -175,13 +151,8 @@ class KeptSuccessTest(absltest.TestCase):
   """A thousand updates after pretraining: success is not lost."""
 
   def test_success_of_cloning_is_kept(self):
-    plan = CollectionPlan(
-      lambda task: toy.PointEnvironment(),
-      toy.WalkingActor,
-      "right",
-      toy.TASKS,
-      seed=1,
-    )
+    make = (lambda task: toy.PointEnvironment(), toy.WalkingActor)
+    plan = CollectionPlan(*make, "right", toy.TASKS, seed=1)
     shown = collection.collect(plan, "reset", toy.TASKS, 200, progress=False)
     shown = {task: part.demonstrations for task, part in shown.items()}
     agent, replay = fixtures.make_toy_agent(
@@ -199,16 +170,18 @@ class KeptSuccessTest(absltest.TestCase):
       },
     )
     agent.prepare()
-    before, apart = self._success(agent), _distance(agent, shown)
-    self.assertEqual(before, {"right": 1.0, "left": 1.0})
+    apart = _distance(agent, shown)
+    self._check_succeeds(agent)
     folder = self.create_tempdir().full_path
     fixtures.train_on_toy(agent, replay, 1100, folder)
     self.assertEqual(agent.learner.updates, 1001)
-    self.assertEqual(self._success(agent), before)
+    self._check_succeeds(agent)
     self.assertLess(_distance(agent, shown), 1.2 * apart)
 
-  def _success(self, agent):
-    return evaluation_csv.success_rates(fixtures.evaluate_on_toy(agent, 10))
+  def _check_succeeds(self, agent):
+    rows = fixtures.evaluate_on_toy(agent, 10)
+    found = evaluation_csv.success_rates(rows)
+    self.assertEqual(found, {"right": 1.0, "left": 1.0})
 
 
 def _distance(agent, shown):

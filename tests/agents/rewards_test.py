@@ -34,20 +34,15 @@ class StoredRewardsTest(absltest.TestCase):
   def test_batches_carry_each_tasks_own_reward(self):
     batch = _stored().batches.draw(0).batch
     rows = synthetic.transitions(ROWS, OBS, A).observation
-    by_row = {
-      row.tobytes(): rewards
-      for row, rewards in zip(rows, _rewards(), strict=True)
-    }
-    for index, row in enumerate(batch.inputs.numpy()):
-      stored = by_row[row.tobytes()]
-      expected = [stored[STORED.index(task)] for task in TASKS]
-      np.testing.assert_array_equal(batch.stored_reward[:, index], expected)
+    expected = _rewards()[:, [STORED.index(task) for task in TASKS]]
+    for row, reward in zip(batch.inputs, batch.stored_reward.T, strict=True):
+      (index,) = np.flatnonzero((rows == row.numpy()).all(1))
+      np.testing.assert_array_equal(reward, expected[index])
 
   def test_there_is_no_discriminator_and_no_need_of_demonstrations(self):
     agent = _stored()
-    agent.update()
+    metrics = fixtures.train(agent, 1)
     self.assertIsNone(agent.learner.networks.discriminator)
-    metrics = agent.metrics()
     self.assertTrue(math.isnan(metrics["loss/discriminator"]))
     self.assertTrue(math.isfinite(metrics["loss/critic"]))
     self.assertTrue(math.isfinite(metrics["reward/lift"]))
@@ -65,11 +60,7 @@ class StoredRewardsTest(absltest.TestCase):
     rows = synthetic.transitions(20, OBS, A, seed=5)
     stored = np.zeros((20, len(STORED)), np.float32)
     stored[:, STORED.index("stack")] = np.arange(20)
-    agent.begin_episode()
-    chosen = []
-    for row in rows.observation:
-      agent.act(row)
-      chosen.append(TASKS.index(agent._task))
+    chosen = fixtures.chosen(agent, rows.observation)
     agent.end_episode(Episode(rows.observation, rows.action, stored))
     expected = sum((15 + t) * 0.5**t for t in range(5))
     value = agent._scheduler.value(chosen[::5])
@@ -129,10 +120,9 @@ class ExamplesTest(absltest.TestCase):
     for row, index in zip(draw.batch.inputs[32:], task[32:], strict=True):
       part = shown[TASKS[index]]
       finals = part.next_observation[part.is_last]
-      self.assertIn(row.numpy().tobytes(), {f.tobytes() for f in finals})
-    torch.testing.assert_close(
-      draw.batch.inputs[32:], draw.batch.next_inputs[32:]
-    )
+      self.assertTrue(*fixtures.among(row[None], finals))
+    examples = draw.batch.inputs[32:]
+    torch.testing.assert_close(draw.batch.next_inputs[32:], examples)
 
   def test_noise_is_in_the_tasks_own_stds(self):
     generator = np.random.default_rng(0)
@@ -195,12 +185,9 @@ class ExamplesTest(absltest.TestCase):
       )
       agent.learner.update(draw._replace(batch=batch))
       networks = agent.learner.networks
-      found.append(
-        [
-          networks.critics.heads.output.weight[[0, 3]].clone(),
-          networks.intentions.heads.output.weight[0].clone(),
-        ]
-      )
+      critics = networks.critics.heads.output.weight
+      intentions = networks.intentions.heads.output.weight
+      found.append([critics[[0, 3]].clone(), intentions[0].clone()])
     torch.testing.assert_close(*found)
 
   def test_values_of_examples_rise_above_the_rest(self):
@@ -214,9 +201,7 @@ class ExamplesTest(absltest.TestCase):
         "reward.scale": 0.1,
       },
     )
-    for _ in range(300):
-      agent.update()
-    metrics = agent.metrics()
+    metrics = fixtures.train(agent, 300)
     batch = agent.batches.draw(0).batch
     action = agent.learner.reward.label(batch).action
     q = agent.learner.networks.critics(batch.inputs, action)[0]

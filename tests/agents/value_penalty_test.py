@@ -48,9 +48,8 @@ class BoundsTest(absltest.TestCase):
       low, high = _of(bounds, [[-2 * most, most]])
       seen.append((low.item(), high.item()))
     expected = [1.0, 1.5, 2.0, 5.0, 7.0]
-    np.testing.assert_allclose(
-      seen, [(-20 * value, 10 * value) for value in expected], rtol=1e-4
-    )
+    expected = np.outer(expected, (-20, 10))
+    np.testing.assert_allclose(seen, expected, rtol=1e-4)
 
   def test_bounds_stay_on_their_sides_of_zero(self):
     bounds = ValueBounds(1, 3, 0.9, _CPU)
@@ -60,24 +59,13 @@ class BoundsTest(absltest.TestCase):
 
   def test_of_examples(self):
     bounds = ExampleBounds(2, 50, 0.99, _CPU)
-    own = torch.tensor([[False, True, True], [False, False, False]])
-    own[1, 0] = True
+    own = torch.tensor([[False, True, True], [True, False, False]])
     value = torch.tensor([[0.0, 2.0, 4.0], [1.0, 5.0, 5.0]])
     reward = 0.1 * (2.0 * own.float() - 1.0)
     low, high = bounds(reward, value)
     np.testing.assert_allclose(low, [[-10.0], [-10.0]], rtol=1e-4)
     expected = [[3.0, 10.0, 10.0], [10.0, 1.0, 1.0]]
     np.testing.assert_allclose(high, expected, rtol=1e-4)
-
-  def test_state_goes_on(self):
-    first, second = (ValueBounds(2, 4, 0.9, _CPU) for _ in range(2))
-    generator = torch.Generator().manual_seed(0)
-    rows = torch.randn(12, 2, 5, generator=generator)
-    for row in rows[:6]:
-      first(row, row)
-    second.load_state_dict(first.state_dict())
-    for row in rows[6:]:
-      torch.testing.assert_close(first(row, row), second(row, row))
 
 
 class AgentTest(absltest.TestCase):
@@ -99,11 +87,8 @@ class AgentTest(absltest.TestCase):
           "scheduler.kind": "main_only",
         },
       )
-      for _ in range(200):
-        agent.update()
-      agent.metrics()
-      agent.update()
-      means[penalty] = agent.metrics()
+      fixtures.train(agent, 200)
+      means[penalty] = fixtures.train(agent, 1)
     self.assertTrue(math.isnan(means[0.0]["value_high/reach"]))
     high = means[10.0]["value_high/reach"]
     self.assertAlmostEqual(high, 2.0, places=3)

@@ -106,7 +106,3 @@ class CheckActionTest(parameterized.TestCase):
   def test_a_wrong_shape_is_named(self, action):
     with self.assertRaisesRegex(ValueError, r"shape.*valid is \(4,\)"):
       control.check_action(action)
-
-  def test_nan_is_refused(self):
-    with self.assertRaisesRegex(ValueError, "NaN"):
-      control.check_action([0.0, np.nan, 0.0, 0.0])

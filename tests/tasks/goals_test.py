@@ -32,6 +32,8 @@ def state(**changes) -> Snapshot:
 _ON_GREEN = {"blue_on_green": True, "blue_on_tray": False}
 _IN_ZONE = {"blue": (0.075, 0.5, 0.145)}
 _CLOSES = {"action": (0, 0, 0, 0.5)}
+_NEAR_GREEN = {"tcp": (-0.15, 0.5, 0.2)}
+_JERKS = {"blue_speed": 0.1, "blue_acceleration": 5.1}
 
 
 class ConditionsTest(parameterized.TestCase):
@@ -53,12 +55,7 @@ class ConditionsTest(parameterized.TestCase):
     ("does_not_open_at_0", "open_gripper", {}, False),
     ("closing_is_no_opening", "open_gripper", _CLOSES, False),
     ("closes", "close_gripper", _CLOSES, True),
-    (
-      "near_green",
-      "close_gripper",
-      {**_CLOSES, "tcp": (-0.15, 0.5, 0.2)},
-      True,
-    ),
+    ("near_green", "close_gripper", {**_CLOSES, **_NEAR_GREEN}, True),
     ("far_away", "close_gripper", {**_CLOSES, "tcp": (0.0, 0.5, 0.246)}, False),
     ("too_fast", "close_gripper", {**_CLOSES, "tcp_speed": 0.081}, False),
     ("reached", "reach", {"tcp": (0.0, 0.5149, 0.145)}, True),
@@ -67,12 +64,7 @@ class ConditionsTest(parameterized.TestCase):
     ("not_lifted", "lift", {"blue": (0.0, 0.5, 0.2049)}, False),
     ("moves", "move_object", {"blue_speed": 0.051}, True),
     ("too_slow", "move_object", {"blue_speed": 0.049}, False),
-    (
-      "jerks",
-      "move_object",
-      {"blue_speed": 0.1, "blue_acceleration": 5.1},
-      False,
-    ),
+    ("jerks", "move_object", _JERKS, False),
   )
   def test_condition(self, task, changes, expected):
     self.assertIs(GOALS[task].condition(state(**changes)), expected)
@@ -84,11 +76,12 @@ class ConditionsTest(parameterized.TestCase):
 
 
 class RewardsTest(parameterized.TestCase):
-  def total(self, task, **changes) -> float:
-    return sum(GOALS[task].dense_terms(state(**changes)).values())
+  def check(self, task, expected, **changes):
+    found = GOALS[task].dense_terms(state(**changes))
+    self.assertAlmostEqual(sum(found.values()), expected)
 
   def test_reach_is_1_minus_tanh_of_10_d(self):
-    self.assertAlmostEqual(self.total("reach"), 1 - math.tanh(0.5))
+    self.check("reach", 1 - math.tanh(0.5))
 
   def test_limits_cost_a_tenth_of_the_push_outwards(self):
     # At the +x face, pushing out by 0.5; at the floor, pushing down by 1.
@@ -99,61 +92,45 @@ class RewardsTest(parameterized.TestCase):
 
   def test_open_is_1_less_half_the_movement_near_a_block(self):
     opens = {"action": (0.3, 0.4, 0.0, -1.0)}
-    self.assertAlmostEqual(self.total("open_gripper", **opens), 0.75)
-    far = self.total("open_gripper", tcp=(0.0, 0.6, 0.28), **opens)
-    self.assertEqual(far, 0.0)
+    self.check("open_gripper", 0.75, **opens)
+    self.check("open_gripper", 0.0, tcp=(0.0, 0.6, 0.28), **opens)
 
   def test_close_with_the_wrong_sign_pays_for_the_movement_alone(self):
-    total = self.total("close_gripper", action=(0.0, 0.6, 0.0, -1.0))
-    self.assertAlmostEqual(total, -0.3)
+    self.check("close_gripper", -0.3, action=(0.0, 0.6, 0.0, -1.0))
 
-  def test_lift_pays_height_near_and_grasp(self):
-    # Gripped 4 cm up: 0.04 / 0.08 + 0.1 + 0.3. Open fingers: neither height nor
-    # grasp. 9 cm up: 1.5 + 0.1 + 0.3.
-    for z, opening, expected in (
-      (0.185, 0.5, 0.9),
-      (0.185, 1.0, 0.1),
-      (0.235, 0.5, 1.9),
-    ):
-      at = {"blue": (0.0, 0.5, z), "tcp": (0.0, 0.5, z)}
-      total = self.total("lift", fingers=(opening, opening), **at)
-      self.assertAlmostEqual(total, expected)
+  @parameterized.parameters(
+    (0.185, 0.5, 0.9),  # gripped 4 cm up: 0.04 / 0.08 + 0.1 + 0.3
+    (0.185, 1.0, 0.1),  # open fingers: neither height nor grasp
+    (0.235, 0.5, 1.9),  # 9 cm up: 1.5 + 0.1 + 0.3
+  )
+  def test_lift_pays_height_near_and_grasp(self, z, opening, expected):
+    at = {"blue": (0.0, 0.5, z), "tcp": (0.0, 0.5, z)}
+    self.check("lift", expected, fingers=(opening, opening), **at)
 
   def test_move_object_pays_speed_and_carrying_less_jerk(self):
     # 5 x 0.1 + near 0.1 + carried 0.1 - 0.1 x min(3, 1.5).
-    total = self.total(
-      "move_object",
-      tcp=(0.0, 0.5, 0.165),
-      blue=(0.0, 0.5, 0.165),
-      fingers=(0.5, 0.5),
-      blue_speed=0.1,
-      blue_acceleration=3.0,
-    )
-    self.assertAlmostEqual(total, 0.55)
+    at = {"blue": (0.0, 0.5, 0.165), "tcp": (0.0, 0.5, 0.165)}
+    speed = {"blue_speed": 0.1, "blue_acceleration": 3.0}
+    self.check("move_object", 0.55, fingers=(0.5, 0.5), **at, **speed)
 
   def test_bring_pays_closeness_then_letting_go(self):
-    total = self.total("bring", blue=(0.035, 0.53, 0.145), tcp=(0, 0.5, 0.145))
-    self.assertAlmostEqual(total, 1 - math.tanh(0.5))  # 5 cm to go
+    at = {"blue": (0.035, 0.53, 0.145), "tcp": (0, 0.5, 0.145)}
+    self.check("bring", 1 - math.tanh(0.5), **at)  # 5 cm to go
     # At the goal, opening, 2 cm away: 1.5 + 0.3 x 0.5.
     above = {"tcp": (0.075, 0.5, 0.165), "action": (0, 0, 0, -1.0)}
-    self.assertAlmostEqual(self.total("bring", **_IN_ZONE, **above), 1.65)
+    self.check("bring", 1.65, **_IN_ZONE, **above)
 
   def test_insert_wants_a_millimetre(self):
-    almost = self.total("insert", **_IN_ZONE, tcp=(0.075, 0.5, 0.145))
-    self.assertAlmostEqual(almost, 1 - math.tanh(0.1))
+    almost = 1 - math.tanh(0.1)
+    self.check("insert", almost, **_IN_ZONE, tcp=(0.075, 0.5, 0.145))
 
   def test_stack_pays_placing_retreat_lift_and_opening(self):
-    # 41 mm above green, 2 cm from the hand, still, opening by 0.5.
-    total = self.total(
-      "stack",
-      blue=(-0.1, 0.5, 0.186),
-      tcp=(-0.1, 0.5, 0.206),
-      fingers=(0.5, 0.5),
-      action=(0.0, 0.0, 0.0, -0.5),
-    )
-    # place 1.5, retreat 0.5, lift 0.2, no grasp at 2 cm, open 1.5.
-    self.assertAlmostEqual(total, 3.7)
-    self.assertEqual(self.total("stack", tcp=(0.0, 0.5, 0.246)), 0.0)
+    # 41 mm above green, 2 cm from the hand, still, opening by 0.5: place 1.5,
+    # retreat 0.5, lift 0.2, no grasp at 2 cm, open 1.5.
+    at = {"blue": (-0.1, 0.5, 0.186), "tcp": (-0.1, 0.5, 0.206)}
+    opens = {"fingers": (0.5, 0.5), "action": (0.0, 0.0, 0.0, -0.5)}
+    self.check("stack", 3.7, **at, **opens)
+    self.check("stack", 0.0, tcp=(0.0, 0.5, 0.246))
 
   def test_stack_lift_term_rises_to_35_mm_and_not_to_7(self):
     held = {"fingers": (0.5, 0.5), "tcp": (0.0, 0.5, 0.165)}

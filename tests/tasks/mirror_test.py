@@ -86,14 +86,6 @@ class MirrorTest(parameterized.TestCase):
         pair = images[:, column], expected[:, column]
         self.assertGreater(np.corrcoef(*pair)[0, 1], 0.5, column)
 
-  def test_twice_is_not_at_all(self):
-    rows = np.random.default_rng(0).uniform(-1, 1, (5, 63)).astype(np.float32)
-    again = mirror.observation(mirror.observation(rows[:, :59]))
-    np.testing.assert_allclose(again, rows[:, :59], atol=1e-6)
-    np.testing.assert_array_equal(
-      mirror.action(mirror.action(rows[:, 59:])), rows[:, 59:]
-    )
-
   def test_demonstrations_are_followed_by_their_images(self):
     random = np.random.default_rng(0)
     shown = Demonstrations(
@@ -107,13 +99,11 @@ class MirrorTest(parameterized.TestCase):
     both = mirror.with_images({"stack": shown, "move_object": shown})
     self.assertIs(both["move_object"], shown)
     found = both["stack"]
-    self.assertEqual(
-      found.episode.tolist(), [0, 0, 0, 1, 1, 2, 3, 3, 3, 4, 4, 5]
-    )
+    episode = [0, 0, 0, 1, 1, 2, 3, 3, 3, 4, 4, 5]
+    self.assertEqual(found.episode.tolist(), episode)
     np.testing.assert_array_equal(found.is_last, np.tile(shown.is_last, 2))
     np.testing.assert_array_equal(found.action[6:, 1], -shown.action[:, 1])
     np.testing.assert_array_equal(found.observation[:6], shown.observation)
-    np.testing.assert_array_equal(
-      found.next_observation[6:], mirror.observation(shown.next_observation)
-    )
+    images = mirror.observation(shown.next_observation)
+    np.testing.assert_array_equal(found.next_observation[6:], images)
     self.assertEmpty(demonstration_checks.of_arrays(found.arrays(), None, None))

@@ -50,13 +50,9 @@ class PublishedExamplesTest(FolderTest):
 
   def test_every_fault_is_reported(self):
     (self.folder / "lift.npz").write_bytes(b"nothing")
-    narrow, action = np.zeros((2, 53)), np.zeros((2, 4))
-    np.savez(
-      self.folder / "bring.npz",
-      observation=narrow,
-      action=action,
-      next_observation=narrow,
-    )
+    rows = {"observation": np.zeros((2, 53)), "action": np.zeros((2, 4))}
+    rows["next_observation"] = rows["observation"]
+    np.savez(self.folder / "bring.npz", **rows)
     with self.assertRaisesRegex(
       demonstrations.DatasetError,
       r"(?s)lift.npz: .*bring.npz: arrays of shapes.*insert.npz: missing",
