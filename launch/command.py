@@ -38,7 +38,10 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
-  graphics.choose_backend(render, window)
+  try:
+    graphics.choose_backend(render, window)
+  except ValueError as error:
+    sys.exit(_fail(str(error)))
   absl_logging.get_absl_handler().addFilter(_is_relevant)
   _show_help_of(main.__module__)
 

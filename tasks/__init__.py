@@ -5,6 +5,7 @@ Importing this loads no simulator; building an environment does.
 
 from typing import TYPE_CHECKING
 
+from lfgp_dmc import graphics
 from lfgp_dmc.task_names import CONTROL_RATES, check_task
 
 if TYPE_CHECKING:
@@ -42,8 +43,10 @@ def load(
     **unknown: refused, with the options that there are.
 
   Raises:
-    ValueError: an unknown name or a value out of range, with the valid ones.
+    ValueError: an unknown name or a value out of range, with the valid ones;
+      or vision where no pictures can be made.
   """
+  graphics.choose_backend()  # before an import of dm_control
   from lfgp_dmc.tasks.environment import PlayEnvironment
   from lfgp_dmc.tasks.play import PlayTask
 
@@ -56,6 +59,8 @@ def load(
   _check("spawn", spawn, ("published", "full_tray"))
   _check("control_hz", control_hz, CONTROL_RATES)
   _check("show_rewards", show_rewards, (False, True))
+  if observations == "vision" and (fault := graphics.fault()):
+    raise ValueError(fault)
   if not time_limit * control_hz >= 1:
     raise ValueError(
       f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"

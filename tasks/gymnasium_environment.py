@@ -20,7 +20,7 @@ from lfgp_dmc import graphics
 from lfgp_dmc.acting.environments import TASK_PREFIXES
 from lfgp_dmc.observations import OBSERVATION_SIZE
 
-graphics.choose_backend()  # before shimmy imports MuJoCo
+graphics.choose_backend()  # before shimmy imports dm_control
 
 from shimmy import DmControlCompatibilityV0  # noqa: E402
 from shimmy.utils.dm_env import dm_spec2gym_space  # noqa: E402
@@ -47,7 +47,12 @@ class BlockEnvironment(DmControlCompatibilityV0):
 
     `render_mode` is None, "rgb_array" or "depth_array"; `render_kwargs` are
     height, width and camera_id of pictures.
+
+    Raises:
+      ValueError: an option is wrong, or no pictures can be made here.
     """
+    if render_mode and (fault := graphics.fault()):
+      raise ValueError(fault)
     self.task_name, self._is_closed = task, False
     self.metadata = dict(self.metadata)  # shimmy writes into it
     super().__init__(
