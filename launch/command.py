@@ -1,8 +1,10 @@
 """What every command shares: start-up, and one clear line for bad input."""
 
 import contextlib
+import io
 import logging
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
@@ -38,6 +40,9 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
+  for stream in (sys.stdout, sys.stderr):
+    if isinstance(stream, io.TextIOWrapper):
+      stream.reconfigure(errors="backslashreplace")
   try:
     graphics.choose_backend(render, window)
   except ValueError as error:
@@ -52,13 +57,34 @@ def run(
 
   def parse(argv: Sequence[str]) -> list[str]:
     try:
+      arguments = _readable(flags.FLAGS.read_flags_from_files(list(argv[1:])))
       if define_flags is not None:
-        define_flags(flags.FLAGS.read_flags_from_files(list(argv[1:])))
-      return flags.FLAGS(list(argv))
+        define_flags(arguments)
+      return flags.FLAGS([argv[0], *arguments])
     except (flags.Error, ValueError) as error:
       sys.exit(_fail(str(error)))
 
   app.run(guarded_main, flags_parser=parse)
+
+
+def _readable(arguments: Sequence[str]) -> list[str]:
+  """The arguments with home folders as `~` expanded.
+
+  Raises:
+    ValueError: one is text that could not be stored or printed.
+  """
+  for argument in arguments:
+    if re.search("[\ud800-\udfff]", argument):  # undecodable bytes
+      encoding = sys.getfilesystemencoding()
+      raise ValueError(
+        f"{ascii(argument)[1:-1]} is not text in this locale ({encoding}); "
+        "where it is UTF-8, set PYTHONUTF8=1 or LC_ALL=C.UTF-8"
+      )
+  # `--name=~/a,~/b`: shells expand neither, flagfiles nothing.
+  return [
+    re.sub(r"(?<=[=,])~[^/,]*", lambda m: os.path.expanduser(m[0]), argument)
+    for argument in arguments
+  ]
 
 
 def _show_help_of(module: str) -> None:

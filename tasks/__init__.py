@@ -3,6 +3,7 @@
 Importing this loads no simulator; building an environment does.
 """
 
+import functools
 from typing import TYPE_CHECKING
 
 from lfgp_dmc import graphics
@@ -73,7 +74,18 @@ def load(
     control_hz=control_hz,
     show_rewards=show_rewards,
   )
-  return PlayEnvironment(play, seed, time_limit)
+  environment = PlayEnvironment(play, seed, time_limit)
+  environment.make = functools.partial(
+    load,
+    task,
+    reward=reward,
+    observations=observations,
+    spawn=spawn,
+    control_hz=control_hz,
+    time_limit=time_limit,
+    show_rewards=show_rewards,
+  )
+  return environment
 
 
 def _check(name: str, value, valid) -> None:

@@ -60,6 +60,10 @@ class BlockEnvironment(DmControlCompatibilityV0):
       render_mode,
       {**_FIXED_RENDERING, **(render_kwargs or {})},
     )
+    # Copies are made anew from these, not from shimmy's arguments.
+    gymnasium.utils.EzPickle.__init__(
+      self, task, render_mode, render_kwargs, **options
+    )
     self.metadata["render_fps"] = options.get("control_hz", 20)
     self._is_flat = options.get("observations", "features") == "features"
     self.observation_space = self._space()
@@ -76,7 +80,13 @@ class BlockEnvironment(DmControlCompatibilityV0):
     return self._observed(timestep.observation), self._info(timestep)
 
   def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
-    """One control step of 50 ms (at 20 Hz)."""
+    """One control step of 50 ms (at 20 Hz).
+
+    Raises:
+      ResetNeeded: the episode is over, or none has begun.
+    """
+    if self._env.needs_reset:
+      raise gymnasium.error.ResetNeeded("no episode is under way: call reset()")
     timestep = self._env.step(action)
     observation = self._observed(timestep.observation)
     is_over = bool(timestep.last())

@@ -107,6 +107,7 @@ class CheckActionTest(parameterized.TestCase):
     with self.assertRaisesRegex(ValueError, r"shape.*valid is \(4,\)"):
       control.check_action(action)
 
-  def test_nan_is_refused(self):
-    with self.assertRaisesRegex(ValueError, "NaN"):
-      control.check_action([0.0, np.nan, 0.0, 0.0])
+  @parameterized.parameters(np.nan, np.inf, -np.inf)
+  def test_what_is_not_finite_is_refused(self, value):
+    with self.assertRaisesRegex(ValueError, "is not finite"):
+      control.check_action([value, 0.0, 0.0, 0.0])
