@@ -40,7 +40,7 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
-  for stream in (sys.stdout, sys.stderr):
+  for stream in (sys.stdout, sys.stderr):  # of any encoding
     if isinstance(stream, io.TextIOWrapper):
       stream.reconfigure(errors="backslashreplace")
   try:
@@ -68,19 +68,12 @@ def run(
 
 
 def _readable(arguments: Sequence[str]) -> list[str]:
-  """The arguments with home folders as `~` expanded.
-
-  Raises:
-    ValueError: one is text that could not be stored or printed.
-  """
+  """Expands `~` as in `--a=~/b,~/c`; raises ValueError for what is no text."""
   for argument in arguments:
-    if re.search("[\ud800-\udfff]", argument):  # undecodable bytes
-      encoding = sys.getfilesystemencoding()
+    if re.search("[\ud800-\udfff]", argument):
       raise ValueError(
-        f"{ascii(argument)[1:-1]} is not text in this locale ({encoding}); "
-        "where it is UTF-8, set PYTHONUTF8=1 or LC_ALL=C.UTF-8"
+        f"{argument} is not text in this locale; set PYTHONUTF8=1 for UTF-8"
       )
-  # `--name=~/a,~/b`: shells expand neither, flagfiles nothing.
   return [
     re.sub(r"(?<=[=,])~[^/,]*", lambda m: os.path.expanduser(m[0]), argument)
     for argument in arguments

@@ -55,10 +55,7 @@ class EnvironmentSpec:
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:
-  """The factory, as a function of a seed that may be None.
-
-  Modules are found in the working directory too, whatever the command.
-  """
+  """The factory, as a function of a seed or None."""
   if "" not in sys.path and os.getcwd() not in sys.path:
     sys.path.append(os.getcwd())
   module, _, name = path.partition(":")
@@ -70,8 +67,8 @@ def _imported(path: str) -> Callable[..., dm_env.Environment]:
   except (ImportError, AttributeError, TypeError, ValueError) as error:
     raise ValueError(
       f"{_FIELD}={path}: {error}; valid: package.module:factory, a function "
-      "without arguments or with `seed`; looked in the working directory "
-      f"{os.getcwd()} and among what is installed or on PYTHONPATH"
+      f"without arguments or with `seed`; looked in {os.getcwd()} and on "
+      "Python's path"
     ) from None
   if seed is None:
     return lambda _: make()

@@ -57,8 +57,8 @@ def load(
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
 
   Raises:
-    ValueError: an unknown task, option or value; the message lists the valid.
-      Or vision where no pictures can be made.
+    ValueError: an unknown task, option or value, with the valid ones; vision
+      where no pictures can be made.
   """
   from lfgp_dmc import tasks
 

@@ -25,10 +25,8 @@ _GL = "MUJOCO_GL"
 _PLATFORM = "PYOPENGL_PLATFORM"
 _EGL_DEVICE = "MUJOCO_EGL_DEVICE_ID"
 # dm_control's synonyms.
-_SYNONYMS = {
-  **dict.fromkeys(("disable", "disabled", "false", "0"), "off"),
-  **dict.fromkeys(("on", "enable", "enabled", "true", "1"), "glfw"),
-}
+_OFF = ("off", "disable", "disabled", "false", "0")
+_GLFW = ("glfw", "on", "enable", "enabled", "true", "1")
 _PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
 _MOST_DEVICES = 10  # as many as dm_control looks at
 
@@ -36,8 +34,8 @@ _MOST_DEVICES = 10  # as many as dm_control looks at
 def choose_backend(render: bool = True, window: bool = False) -> str:
   """Sets `MUJOCO_GL` and `PYOPENGL_PLATFORM` for this process and its children.
 
-  A `MUJOCO_GL` that the user set is kept. A dm_control that was imported before
-  keeps its backend if that can draw; otherwise it gets the one chosen here.
+  What the user set is kept, as is the backend of a dm_control that was imported
+  before, if it can draw.
 
   Args:
     render: whether pictures are needed; without them nothing is loaded.
@@ -47,8 +45,7 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
     One of `BACKENDS`; "off" where pictures cannot be made, see `fault`.
 
   Raises:
-    ValueError: `MUJOCO_GL` is unknown, or dm_control could not be imported
-      with it.
+    ValueError: dm_control could not be imported with the user's `MUJOCO_GL`.
   """
   imported = sys.modules.get("dm_control._render")
   chosen = _requested() or getattr(imported, "BACKEND", None) or ""
@@ -74,13 +71,11 @@ def fault() -> str:
 def _requested() -> str:
   """`MUJOCO_GL`, by its canonical name; empty if it is not set."""
   value = os.environ.get(_GL, "").lower().strip()
-  return _SYNONYMS.get(value, value)
+  return "off" if value in _OFF else "glfw" if value in _GLFW else value
 
 
 def _fault_of(backend: str) -> str:
-  install = _INSTALL
-  if _EGL_DEVICE in os.environ:
-    install = f"unset {_EGL_DEVICE}={os.environ[_EGL_DEVICE]}, or {_INSTALL}"
+  install = f"unset {_EGL_DEVICE}, or " * (_EGL_DEVICE in os.environ) + _INSTALL
   if backend not in BACKENDS:
     return f"{_GL} is {backend!r}; valid: {', '.join(BACKENDS)}"
   if backend == "off":

@@ -45,8 +45,10 @@ def load(
 
   Raises:
     ValueError: an unknown name or a value out of range, with the valid ones;
-      or vision where no pictures can be made.
+      vision where no pictures can be made.
   """
+  given = {**locals()}
+  del given["seed"], given["unknown"]
   graphics.choose_backend()  # before an import of dm_control
   from lfgp_dmc.tasks.environment import PlayEnvironment
   from lfgp_dmc.tasks.play import PlayTask
@@ -75,16 +77,7 @@ def load(
     show_rewards=show_rewards,
   )
   environment = PlayEnvironment(play, seed, time_limit)
-  environment.make = functools.partial(
-    load,
-    task,
-    reward=reward,
-    observations=observations,
-    spawn=spawn,
-    control_hz=control_hz,
-    time_limit=time_limit,
-    show_rewards=show_rewards,
-  )
+  environment.make = functools.partial(load, **given)
   return environment
 
 

@@ -65,7 +65,7 @@ class PlayEnvironment(composer.Environment):
     physics_failures: episodes that ended in a divergence of the simulation.
     checks: checks of the conditions in a control step, one every 50 ms.
     on_check: called after each, for smooth films at low control rates.
-    make: builds another, for copies.
+    make: builds another, for copies; set by `tasks.load`.
   """
 
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
@@ -88,8 +88,6 @@ class PlayEnvironment(composer.Environment):
     )
 
   def __reduce__(self):
-    if self.make is None:
-      raise TypeError("only environments of lfgp_dmc.load can be copied")
     return self.make, (), self._random_state.get_state()
 
   def __setstate__(self, random_state):

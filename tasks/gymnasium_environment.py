@@ -46,10 +46,8 @@ class BlockEnvironment(DmControlCompatibilityV0):
     """Builds the environment of a task; options are those of `lfgp_dmc.load`.
 
     `render_mode` is None, "rgb_array" or "depth_array"; `render_kwargs` are
-    height, width and camera_id of pictures.
-
-    Raises:
-      ValueError: an option is wrong, or no pictures can be made here.
+    height, width and camera_id of pictures. Raises ValueError if an option is
+    wrong, or pictures are wanted where none can be made.
     """
     if render_mode and (fault := graphics.fault()):
       raise ValueError(fault)
@@ -60,7 +58,7 @@ class BlockEnvironment(DmControlCompatibilityV0):
       render_mode,
       {**_FIXED_RENDERING, **(render_kwargs or {})},
     )
-    # Copies are made anew from these, not from shimmy's arguments.
+    # Of these copies are made anew, not of shimmy's arguments.
     gymnasium.utils.EzPickle.__init__(
       self, task, render_mode, render_kwargs, **options
     )
@@ -80,11 +78,7 @@ class BlockEnvironment(DmControlCompatibilityV0):
     return self._observed(timestep.observation), self._info(timestep)
 
   def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
-    """One control step of 50 ms (at 20 Hz).
-
-    Raises:
-      ResetNeeded: the episode is over, or none has begun.
-    """
+    """One control step of 50 ms (at 20 Hz); needs a reset after the last."""
     if self._env.needs_reset:
       raise gymnasium.error.ResetNeeded("no episode is under way: call reset()")
     timestep = self._env.step(action)

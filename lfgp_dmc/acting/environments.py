@@ -31,14 +31,10 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     ValueError: the environment has no floating-point observable, or nests them.
   """
   spec = environment.observation_spec()
-  parts = [*spec.values()] if isinstance(spec, Mapping) else [spec]
+  parts = spec.values() if isinstance(spec, Mapping) else [spec]
   if not all(isinstance(part, specs.Array) for part in parts):
-    raise ValueError(
-      f"observation_spec() is {spec}; valid: an array, or names of arrays"
-    )
+    raise ValueError(f"observations are {spec}; valid: an array, or named ones")
   if not isinstance(spec, Mapping):
-    if not np.issubdtype(spec.dtype, np.floating):
-      raise ValueError(f"observations are {spec.dtype}; valid: floats")
     return lambda observation: np.asarray(observation, np.float32).ravel()
   if observations.OBSERVATION_SLICES.keys() <= spec.keys():
     return observations.flatten
@@ -64,22 +60,16 @@ def flattener(environment: dm_env.Environment) -> Flattener:
 def with_unit_actions(environment: dm_env.Environment) -> dm_env.Environment:
   """The environment, with actions as agents choose them: [A] in [-1, 1].
 
-  Where its own action spec differs, actions are reshaped and scaled linearly
-  from [-1, 1] to its bounds.
-
-  Raises:
-    ValueError: actions are not floats with finite bounds.
+  They are reshaped and scaled linearly to its own action spec. Raises
+  ValueError if that is not of floats with finite bounds.
   """
   spec: Any = environment.action_spec()
   if (
     not isinstance(spec, specs.BoundedArray)
     or not np.issubdtype(spec.dtype, np.floating)
-    or not np.isfinite([*spec.minimum.flat, *spec.maximum.flat]).all()
+    or not np.isfinite(spec.maximum - spec.minimum).all()
   ):
-    raise ValueError(
-      f"action_spec() is {spec}; valid: a BoundedArray of floats with finite "
-      "bounds"
-    )
+    raise ValueError(f"actions are {spec}; valid: floats with finite bounds")
   is_unit = np.all(spec.minimum == -1) and np.all(spec.maximum == 1)
   if is_unit and len(spec.shape) == 1:
     return environment
@@ -99,8 +89,8 @@ class _UnitActions:
 
   def action_spec(self) -> specs.BoundedArray:
     """[A] in [-1, 1]."""
-    size = (int(np.prod(self._spec.shape)),)
-    return specs.BoundedArray(size, np.float32, -1.0, 1.0, "action")
+    size = int(np.prod(self._spec.shape))
+    return specs.BoundedArray((size,), np.float32, -1.0, 1.0, "action")
 
   def step(self, action: np.ndarray) -> dm_env.TimeStep:
     """A step by an action in [-1, 1]^A."""

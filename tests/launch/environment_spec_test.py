@@ -40,10 +40,10 @@ class EnvironmentSpecTest(fixtures.FolderTest, parameterized.TestCase):
   @parameterized.parameters(
     ("my_own_world:with_size", "missing a required argument: 'size'; valid"),
     ("my_own_world:nowhere", "no attribute 'nowhere'; valid"),
-    ("no_such_world:make", "looked in the working directory"),
+    ("no_such_world:make", "looked in .* and on Python"),
     (":make", "Empty module name"),
     ("my_own_world:_SOURCE", "has no attribute"),
-    ("my_own_world:Discrete", "DiscreteArray.*valid: a BoundedArray"),
+    ("my_own_world:Discrete", "DiscreteArray.*valid: floats"),
     ("my_own_world:nothing", "'NoneType' object has no attribute"),
   )
   def test_one_line_says_what_is_wrong(self, path, message):

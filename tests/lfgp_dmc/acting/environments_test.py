@@ -58,13 +58,12 @@ class UnitActionsTest(parameterized.TestCase):
     [[specs.BoundedArray((2,), np.float32, -1, 1)]],
   )
   def test_refuses_what_cannot_be_learned(self, spec):
-    with self.assertRaisesRegex(ValueError, "valid: a BoundedArray of floats"):
+    with self.assertRaisesRegex(ValueError, "valid: floats with finite bounds"):
       environments.with_unit_actions(_Foreign(spec))
 
   @parameterized.parameters(
     [[specs.Array((2,), np.float32)]],
     ({"arm": {"angle": specs.Array((2,), np.float32)}},),
-    specs.Array((8, 8, 3), np.uint8),
   )
   def test_refuses_observations_that_are_not_arrays_of_floats(self, spec):
     with self.assertRaisesRegex(ValueError, "valid: "):
