@@ -12,8 +12,8 @@
 by side. --what=strips finds a successful episode of each main task (of the
 expert, or of each run of --run=a,b,c,d) and shows it as a row of frames.
 --what=reset shows the world after a reset. The suffix of --output chooses a
-clip (.mp4, .gif, .webp) or a picture (.png; of an episode a film strip); what it
-shows goes into a JSON file beside it.
+clip (.mp4, .gif, .webp) or a picture (.png; of an episode a film strip); what
+it shows goes into a JSON file beside it.
 """
 
 import functools
