@@ -178,7 +178,7 @@ class Policy:
       generator: source of the sample; None: the one that `begin` seeded.
 
     Raises:
-      ValueError: the policy has no such task.
+      ValueError: the policy has no such task, or takes other observations.
     """
     index = self._index(self._task if task is None else task)
     if deterministic is None:
@@ -188,6 +188,12 @@ class Policy:
         observation, dtype=torch.float32, device=self._device
       )
       network = self._network
+      width = network.standardiser.mean.shape[0]
+      if raw.dim() not in (1, 2) or raw.shape[-1] != width:
+        raise ValueError(
+          f"observation has shape {tuple(raw.shape)}; valid: ({width},) or "
+          f"(B, {width})"
+        )
       inputs = network.standardiser(raw if raw.dim() > 1 else raw[None])
       mean, std = network.heads.one(network.trunk(inputs), index)
       if not deterministic:

@@ -1,8 +1,10 @@
 """What every command shares: start-up, and one clear line for bad input."""
 
 import contextlib
+import io
 import logging
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar
@@ -38,7 +40,13 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
-  graphics.choose_backend(render, window)
+  for stream in (sys.stdout, sys.stderr):  # of any encoding
+    if isinstance(stream, io.TextIOWrapper):
+      stream.reconfigure(errors="backslashreplace")
+  try:
+    graphics.choose_backend(render, window)
+  except ValueError as error:
+    sys.exit(_fail(str(error)))
   absl_logging.get_absl_handler().addFilter(_is_relevant)
   _show_help_of(main.__module__)
 
@@ -49,13 +57,27 @@ def run(
 
   def parse(argv: Sequence[str]) -> list[str]:
     try:
+      arguments = _readable(flags.FLAGS.read_flags_from_files(list(argv[1:])))
       if define_flags is not None:
-        define_flags(flags.FLAGS.read_flags_from_files(list(argv[1:])))
-      return flags.FLAGS(list(argv))
+        define_flags(arguments)
+      return flags.FLAGS([argv[0], *arguments])
     except (flags.Error, ValueError) as error:
       sys.exit(_fail(str(error)))
 
   app.run(guarded_main, flags_parser=parse)
+
+
+def _readable(arguments: Sequence[str]) -> list[str]:
+  """Expands `~` as in `--a=~/b,~/c`; raises ValueError for what is no text."""
+  for argument in arguments:
+    if re.search("[\ud800-\udfff]", argument):
+      raise ValueError(
+        f"{argument} is not text in this locale; set PYTHONUTF8=1 for UTF-8"
+      )
+  return [
+    re.sub(r"(?<=[=,])~[^/,]*", lambda m: os.path.expanduser(m[0]), argument)
+    for argument in arguments
+  ]
 
 
 def _show_help_of(module: str) -> None:

@@ -1,6 +1,7 @@
 """The demonstrations of a run: read, or collected first."""
 
 import pathlib
+import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -40,7 +41,7 @@ def load(
       found = demonstrations.read_folder(folder, tasks, *widths)
     _check_rate(config, found)
   except ValueError as error:
-    hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
+    hint = "" if folder.exists() else f"\ncollect it: {_command(config)}"
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
   return mirror.with_images(found) if config.mirror_demonstrations else found
@@ -85,21 +86,29 @@ def _collect(config: RunConfig) -> None:
   """Collects the dataset if `config.collect_pairs` says so."""
   if not config.collect_pairs:
     return
-  command = _command(config, str(config.collect_pairs))
-  print(f"collecting demonstrations: {command}", flush=True)
-  arguments = [sys.executable, str(_COLLECT), *command.split()[2:]]
+  print(f"collecting demonstrations: {_command(config)}", flush=True)
+  arguments = [sys.executable, str(_COLLECT), *_flags(config)]
   if subprocess.run(arguments).returncode:
     raise UserError(f"{config.demonstrations} could not be collected")
 
 
-def _command(config: RunConfig, pairs_per_task: str) -> str:
-  is_multitask = ALGORITHMS[config.algorithm].is_multitask
-  rate = f"--control_hz={config.control_hz} "
+def _command(config: RunConfig) -> str:
+  """To be typed into a shell."""
+  script = ("python", "launch/collect_demonstrations.py")
+  return shlex.join([*script, *_flags(config)])
+
+
+def _flags(config: RunConfig) -> list[str]:
+  flags = {
+    "task": config.main_task,
+    "tasks": config.main_task,
+    "pairs_per_task": config.collect_pairs or "...",
+    "seed": config.seed,
+    "control_hz": config.control_hz,
+    "output": config.demonstrations,
+  }
+  if ALGORITHMS[config.algorithm].is_multitask:
+    del flags["tasks"]
   if config.control_hz == RunConfig.control_hz:
-    rate = ""
-  own = "" if is_multitask else f"--tasks={config.main_task} "
-  return (
-    f"python launch/collect_demonstrations.py --task={config.main_task} {own}"
-    f"--pairs_per_task={pairs_per_task} --seed={config.seed} {rate}"
-    f"--output={config.demonstrations}"
-  )
+    del flags["control_hz"]
+  return [f"--{name}={value}" for name, value in flags.items()]

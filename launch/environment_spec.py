@@ -3,12 +3,17 @@
 import dataclasses
 import importlib
 import inspect
+import os
+import sys
 from collections.abc import Callable
 
 import dm_env
 
 import lfgp_dmc
+from lfgp_dmc.acting import environments
 from lfgp_dmc.task_names import check_task
+
+_FIELD = "config.environment"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -25,13 +30,15 @@ class EnvironmentSpec:
     """Builds it; `show_rewards` adds each task's dense reward, for returns.
 
     Raises:
-      ValueError: there is no such task, factory or rate; lists the valid.
+      ValueError: there is no such task, factory or rate, with the valid; or
+        nothing can be learned with its actions.
     """
     if self.environment:
-      make = _imported(self.environment)
-      if seed is not None and "seed" in inspect.signature(make).parameters:
-        return make(seed=seed)
-      return make()
+      made = _imported(self.environment)(seed)
+      try:
+        return environments.with_unit_actions(made)
+      except (AttributeError, ValueError) as error:
+        raise ValueError(f"{_FIELD}={self.environment}: {error}") from None
     return lfgp_dmc.load(
       self.main_task,
       seed,
@@ -48,10 +55,22 @@ class EnvironmentSpec:
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:
-  module_name, _, name = path.partition(":")
+  """The factory, as a function of a seed or None."""
+  if "" not in sys.path and os.getcwd() not in sys.path:
+    sys.path.append(os.getcwd())
+  module, _, name = path.partition(":")
   try:
-    return getattr(importlib.import_module(module_name), name)
-  except (ImportError, AttributeError) as error:
+    make = getattr(importlib.import_module(module), name)
+    signature = inspect.signature(make)
+    seed = signature.parameters.get("seed")
+    signature.bind(**({"seed": None} if seed else {}))
+  except (ImportError, AttributeError, TypeError, ValueError) as error:
     raise ValueError(
-      f"config.environment={path}: {error}; valid: package.module:factory"
+      f"{_FIELD}={path}: {error}; valid: package.module:factory, a function "
+      f"without arguments or with `seed`; looked in {os.getcwd()} and on "
+      "Python's path"
     ) from None
+  if seed is None:
+    return lambda _: make()
+  own = None if seed.default is seed.empty else seed.default
+  return lambda given: make(seed=own if given is None else given)

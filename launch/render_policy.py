@@ -12,8 +12,8 @@
 by side. --what=strips finds a successful episode of each main task (of the
 expert, or of each run of --run=a,b,c,d) and shows it as a row of frames.
 --what=reset shows the world after a reset. The suffix of --output chooses a
-clip (.mp4, .gif) or a picture (.png; of an episode a film strip); what it shows
-goes into a JSON file beside it.
+clip (.mp4, .gif, .webp) or a picture (.png; of an episode a film strip); what
+it shows goes into a JSON file beside it.
 """
 
 import functools
@@ -48,7 +48,7 @@ _COLLECTION = flags.DEFINE_enum(
   "collection", "reset", ["reset", "play"], "play: task after task, no reset."
 )
 _OUTPUT = flags.DEFINE_string(
-  "output", "", ".mp4, .gif or .png; default: videos/NAME_TASK.mp4."
+  "output", "", ".mp4, .gif, .webp or .png; default: videos/NAME_TASK.mp4."
 )
 _GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
 _SEED = flags.DEFINE_integer("seed", 0, "Of the (first) reset.", lower_bound=0)

@@ -10,6 +10,7 @@ events, checkpoints/, replay/ and policy.safetensors.
 
 import functools
 import pathlib
+import shlex
 
 from absl import flags
 
@@ -45,9 +46,11 @@ def report(
 ) -> int:
   """Prints the last evaluation and the places; returns the exit status."""
   if not progress.is_complete:
+    again = shlex.join(
+      ["python", "launch/train.py", f"--run={path}", "--resume"]
+    )
     print(
-      f"stopped at {progress.env_step} of {config.env_steps}; continue: "
-      f"python launch/train.py --run={path} --resume"
+      f"stopped at {progress.env_step} of {config.env_steps}; continue: {again}"
     )
     return command.INTERRUPTED
   rows = evaluation_csv.read_csv(path / "evaluation.csv")

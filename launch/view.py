@@ -38,7 +38,7 @@ def main() -> None:
     task = command.check_choice("task", task or spec.main_task, spec.tasks)
   if not graphics.has_display():
     raise command.UserError(
-      "the viewer needs a display, and there is none (DISPLAY is not set); "
+      "the viewer needs a display, and DISPLAY names none that opens; "
       "without one, launch/render_policy.py makes videos"
     )
   _open(spec, task or lfgp_dmc.MAIN_TASKS[0])

@@ -17,7 +17,6 @@ from typing import Any
 import dm_env
 import numpy as np
 
-from lfgp_dmc import graphics
 from lfgp_dmc.observations import (
   OBSERVATION_SIZE,
   OBSERVATION_SLICES,
@@ -58,9 +57,9 @@ def load(
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
 
   Raises:
-    ValueError: an unknown task, option or value; the message lists the valid.
+    ValueError: an unknown task, option or value, with the valid ones; vision
+      where no pictures can be made.
   """
-  graphics.choose_backend()  # before the first import of MuJoCo
   from lfgp_dmc import tasks
 
   return tasks.load(task, seed=seed, **options)

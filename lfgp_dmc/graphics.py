@@ -1,15 +1,17 @@
 """Chooses MuJoCo's rendering backend.
 
-MuJoCo and dm_control read `MUJOCO_GL` at their first import. With no display
-and no choice they take GLFW, warn, and fail at the first picture: call
-`choose_backend` before importing them.
+dm_control reads `MUJOCO_GL` at its first import. With no display and no choice
+it takes GLFW, warns, and fails at the first picture: every door calls
+`choose_backend` before it builds an environment.
 """
 
 import ctypes
 import ctypes.util
 import functools
+import importlib
 import os
 import sys
+import warnings
 
 BACKENDS = ("glfw", "egl", "osmesa", "off")
 # Mesa's EGL on Debian and Ubuntu; it needs no GPU.
@@ -20,16 +22,20 @@ _INSTALL = (
   f"install Mesa's EGL (Debian, Ubuntu: apt-get install {' '.join(PACKAGES)})"
 )
 _GL = "MUJOCO_GL"
+_PLATFORM = "PYOPENGL_PLATFORM"
+_EGL_DEVICE = "MUJOCO_EGL_DEVICE_ID"
+# dm_control's synonyms.
 _OFF = ("off", "disable", "disabled", "false", "0")
+_GLFW = ("glfw", "on", "enable", "enabled", "true", "1")
 _PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
-_MOST_DEVICES = 16
+_MOST_DEVICES = 10  # as many as dm_control looks at
 
 
 def choose_backend(render: bool = True, window: bool = False) -> str:
   """Sets `MUJOCO_GL` and `PYOPENGL_PLATFORM` for this process and its children.
 
-  A `MUJOCO_GL` that the user set is kept, and nothing changes once MuJoCo has
-  been imported.
+  What the user set is kept, as is the backend of a dm_control that was imported
+  before, if it can draw.
 
   Args:
     render: whether pictures are needed; without them nothing is loaded.
@@ -37,33 +43,51 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
 
   Returns:
     One of `BACKENDS`; "off" where pictures cannot be made, see `fault`.
+
+  Raises:
+    ValueError: dm_control could not be imported with the user's `MUJOCO_GL`.
   """
-  chosen = os.environ.get(_GL, "").lower().strip()
-  if chosen in _OFF:
-    chosen = "off"
-  if not chosen and not {"mujoco", "dm_control"} & set(sys.modules):
+  imported = sys.modules.get("dm_control._render")
+  chosen = _requested() or getattr(imported, "BACKEND", None) or ""
+  if not chosen or (not os.environ.get(_GL) and _fault_of(chosen)):
     chosen = _best(render, window)
-    os.environ[_GL] = chosen
-  if chosen in ("egl", "osmesa"):
-    os.environ["PYOPENGL_PLATFORM"] = chosen
-  return chosen or "glfw"
+  if chosen not in ("glfw", "off") and (reason := _fault_of(chosen)):
+    raise ValueError(reason)
+  os.environ[_GL] = chosen
+  if chosen in ("egl", "osmesa") and os.environ.get(_PLATFORM) != chosen:
+    os.environ[_PLATFORM] = chosen
+    for name in [m for m in sys.modules if m.partition(".")[0] == "OpenGL"]:
+      del sys.modules[name]  # it was imported for another platform
+  if imported and chosen != imported.BACKEND:
+    importlib.reload(imported)
+  return chosen
 
 
 def fault() -> str:
   """Why this process cannot draw, and what to do; empty if it can."""
-  chosen = os.environ.get(_GL, "").lower().strip()
-  if chosen in _OFF:
-    return f"no pictures: MUJOCO_GL is {chosen!r}; " + (
-      "unset it" if works_without_display() else _INSTALL
+  return _fault_of(_requested() or "glfw")
+
+
+def _requested() -> str:
+  """`MUJOCO_GL`, by its canonical name; empty if it is not set."""
+  value = os.environ.get(_GL, "").lower().strip()
+  return "off" if value in _OFF else "glfw" if value in _GLFW else value
+
+
+def _fault_of(backend: str) -> str:
+  install = f"unset {_EGL_DEVICE}, or " * (_EGL_DEVICE in os.environ) + _INSTALL
+  if backend not in BACKENDS:
+    return f"{_GL} is {backend!r}; valid: {', '.join(BACKENDS)}"
+  if backend == "off":
+    return f"no pictures: {_GL} is 'off'; " + (
+      "unset it" if works_without_display() else install
     )
-  if chosen not in ("", *BACKENDS):
-    return f"MUJOCO_GL is {chosen!r}; valid: {', '.join(BACKENDS)}"
-  if chosen == "egl" and not _egl_works():
-    return f"MUJOCO_GL is 'egl', but EGL does not work: {_INSTALL}"
-  if chosen == "osmesa" and not _osmesa_works():
-    return "MUJOCO_GL is 'osmesa', but there is no OSMesa: unset it"
-  if chosen in ("", "glfw") and not has_display():
-    return "MUJOCO_GL is 'glfw', but there is no display: unset it"
+  if backend == "egl" and not _egl_works():
+    return f"{_GL} is 'egl', but EGL does not work: {install}"
+  if backend == "osmesa" and not _osmesa_works():
+    return f"{_GL} is 'osmesa', but there is no OSMesa: unset it"
+  if backend == "glfw" and not has_display():
+    return f"{_GL} is 'glfw', but there is no display: unset it"
   return ""
 
 
@@ -73,10 +97,19 @@ def works_without_display() -> bool:
 
 
 def has_display() -> bool:
-  """Whether a window could be opened."""
+  """Whether a window can be opened: a display may be named, but gone."""
   if sys.platform != "linux":
     return True
-  return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+  if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+    return False
+  with warnings.catch_warnings():
+    warnings.simplefilter("ignore")
+    try:
+      import glfw
+
+      return bool(glfw.init())
+    except (ImportError, OSError, Warning):  # a GLFWError is a warning
+      return False
 
 
 def _best(render: bool, window: bool) -> str:
@@ -117,7 +150,10 @@ def _egl_works() -> bool:
   display_type = ctypes.CFUNCTYPE(pointer, ctypes.c_uint, pointer, pointer)
   if not query_type(query)(_MOST_DEVICES, devices, ctypes.byref(count)):
     return False
-  for device in devices[: count.value]:
+  found, selected = devices[: count.value], os.environ.get(_EGL_DEVICE)
+  if selected is not None:
+    found = found[int(selected) :][:1] if selected.isdecimal() else []
+  for device in found:
     display = display_type(get_display)(_PLATFORM_DEVICE, device, None)
     # Left open: MuJoCo gets the same display.
     if display and egl.eglInitialize(ctypes.c_void_p(display), None, None):

@@ -3,8 +3,10 @@
 Importing this loads no simulator; building an environment does.
 """
 
+import functools
 from typing import TYPE_CHECKING
 
+from lfgp_dmc import graphics
 from lfgp_dmc.task_names import CONTROL_RATES, check_task
 
 if TYPE_CHECKING:
@@ -42,8 +44,12 @@ def load(
     **unknown: refused, with the options that there are.
 
   Raises:
-    ValueError: an unknown name or a value out of range, with the valid ones.
+    ValueError: an unknown name or a value out of range, with the valid ones;
+      vision where no pictures can be made.
   """
+  given = {**locals()}
+  del given["seed"], given["unknown"]
+  graphics.choose_backend()  # before an import of dm_control
   from lfgp_dmc.tasks.environment import PlayEnvironment
   from lfgp_dmc.tasks.play import PlayTask
 
@@ -56,6 +62,8 @@ def load(
   _check("spawn", spawn, ("published", "full_tray"))
   _check("control_hz", control_hz, CONTROL_RATES)
   _check("show_rewards", show_rewards, (False, True))
+  if observations == "vision" and (fault := graphics.fault()):
+    raise ValueError(fault)
   if not time_limit * control_hz >= 1:
     raise ValueError(
       f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
@@ -68,7 +76,9 @@ def load(
     control_hz=control_hz,
     show_rewards=show_rewards,
   )
-  return PlayEnvironment(play, seed, time_limit)
+  environment = PlayEnvironment(play, seed, time_limit)
+  environment.make = functools.partial(load, **given)
+  return environment
 
 
 def _check(name: str, value, valid) -> None:

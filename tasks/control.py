@@ -119,7 +119,7 @@ def check_action(action) -> np.ndarray:
   """Clips an action to [-1, 1].
 
   Raises:
-    ValueError: wrong shape, or a value that is NaN.
+    ValueError: wrong shape, or a value that is not finite.
   """
   action = np.asarray(action, dtype=np.float64)
   if action.shape != (ACTION_SIZE,):
@@ -127,7 +127,6 @@ def check_action(action) -> np.ndarray:
       f"action has shape {action.shape}; valid is ({ACTION_SIZE},): dx, dy, "
       "dz of the set-point and the gripper, each in [-1, 1]"
     )
-  # NaN exactly when a term is, or when infinities cancel: the cheapest test.
-  if math.isnan(action.sum()):
-    raise ValueError(f"action {action} contains NaN; valid values are [-1, 1]")
+  if not math.isfinite(action.sum()) and not np.isfinite(action).all():
+    raise ValueError(f"action {action} is not finite; valid values are [-1, 1]")
   return np.clip(action, -1.0, 1.0)

@@ -58,10 +58,14 @@ def _is_plain(value) -> bool:
 class PlayEnvironment(composer.Environment):
   """A `composer.Environment` with seeds and requested starts.
 
+  What `copy` and `pickle` make of it is a new environment of the same task and
+  options, before its first reset, with the same random state.
+
   Attributes:
     physics_failures: episodes that ended in a divergence of the simulation.
     checks: checks of the conditions in a control step, one every 50 ms.
     on_check: called after each, for smooth films at low control rates.
+    make: builds another, for copies; set by `tasks.load`.
   """
 
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
@@ -70,6 +74,7 @@ class PlayEnvironment(composer.Environment):
     self._step_limit = round(time_limit / task.control_timestep)
     self.checks = round(task.control_timestep / ws.CHECK_PERIOD)
     self.on_check: Callable[[], None] | None = None
+    self.make: Callable[[], PlayEnvironment] | None = None
     self._steps_per_check = round(ws.CHECK_PERIOD / task.physics_timestep)
     self.physics_failures = 0
     super().__init__(
@@ -81,6 +86,17 @@ class PlayEnvironment(composer.Environment):
       max_reset_attempts=20,
       recompile_mjcf_every_episode=False,
     )
+
+  def __reduce__(self):
+    return self.make, (), self._random_state.get_state()
+
+  def __setstate__(self, random_state):
+    self._random_state.set_state(random_state)
+
+  @property
+  def needs_reset(self) -> bool:
+    """Whether no episode is under way: a step would begin one."""
+    return self._reset_next_step
 
   def _make_observation_updater(self):
     return _OncePerStepUpdater(
@@ -136,7 +152,7 @@ class PlayEnvironment(composer.Environment):
     counted in `physics_failures`.
 
     Raises:
-      ValueError: the action has a wrong shape or holds NaN.
+      ValueError: the action has a wrong shape or is not finite.
     """
     if self._reset_next_step:
       return self.reset()

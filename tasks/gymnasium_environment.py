@@ -20,7 +20,7 @@ from lfgp_dmc import graphics
 from lfgp_dmc.acting.environments import TASK_PREFIXES
 from lfgp_dmc.observations import OBSERVATION_SIZE
 
-graphics.choose_backend()  # before shimmy imports MuJoCo
+graphics.choose_backend()  # before shimmy imports dm_control
 
 from shimmy import DmControlCompatibilityV0  # noqa: E402
 from shimmy.utils.dm_env import dm_spec2gym_space  # noqa: E402
@@ -46,14 +46,21 @@ class BlockEnvironment(DmControlCompatibilityV0):
     """Builds the environment of a task; options are those of `lfgp_dmc.load`.
 
     `render_mode` is None, "rgb_array" or "depth_array"; `render_kwargs` are
-    height, width and camera_id of pictures.
+    height, width and camera_id of pictures. Raises ValueError if an option is
+    wrong, or pictures are wanted where none can be made.
     """
+    if render_mode and (fault := graphics.fault()):
+      raise ValueError(fault)
     self.task_name, self._is_closed = task, False
     self.metadata = dict(self.metadata)  # shimmy writes into it
     super().__init__(
       lfgp_dmc.load(task, **options),
       render_mode,
       {**_FIXED_RENDERING, **(render_kwargs or {})},
+    )
+    # Of these copies are made anew, not of shimmy's arguments.
+    gymnasium.utils.EzPickle.__init__(
+      self, task, render_mode, render_kwargs, **options
     )
     self.metadata["render_fps"] = options.get("control_hz", 20)
     self._is_flat = options.get("observations", "features") == "features"
@@ -71,7 +78,9 @@ class BlockEnvironment(DmControlCompatibilityV0):
     return self._observed(timestep.observation), self._info(timestep)
 
   def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict]:
-    """One control step of 50 ms (at 20 Hz)."""
+    """One control step of 50 ms (at 20 Hz); needs a reset after the last."""
+    if self._env.needs_reset:
+      raise gymnasium.error.ResetNeeded("no episode is under way: call reset()")
     timestep = self._env.step(action)
     observation = self._observed(timestep.observation)
     is_over = bool(timestep.last())

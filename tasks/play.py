@@ -192,9 +192,8 @@ class PlayTask(composer.Task):
 
   def action_spec(self, physics) -> specs.BoundedArray:
     """dx, dy, dz of the set-point and the gripper, each in [-1, 1]."""
-    return specs.BoundedArray(
-      (control.ACTION_SIZE,), np.float32, -1.0, 1.0, "action"
-    )
+    ones = np.ones(control.ACTION_SIZE, np.float32)
+    return specs.BoundedArray(ones.shape, ones.dtype, -ones, ones, "action")
 
 
 def _is_out_of_tray(position) -> bool:

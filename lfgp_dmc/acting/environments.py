@@ -1,8 +1,9 @@
-"""How any dm_env environment is read: flat observations, widths, rewards.
+"""How any dm_env environment is read and driven: flat rows, widths, rewards.
 
 Our nine tasks are laid out in the order of `observations.py`, every other
 environment's floating-point observables in the order of its specification. What
-belongs to tasks (`success/`, `condition/`, `reward/`) is never an input.
+belongs to tasks (`success/`, `condition/`, `reward/`) is never an input. Agents
+act in [-1, 1]: see `with_unit_actions`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,6 +11,7 @@ from typing import Any
 
 import dm_env
 import numpy as np
+from dm_env import specs
 
 from lfgp_dmc import observations
 
@@ -26,9 +28,12 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   """The function from this environment's observation to float32 [O].
 
   Raises:
-    ValueError: the environment has no floating-point observable.
+    ValueError: the environment has no floating-point observable, or nests them.
   """
   spec = environment.observation_spec()
+  parts = spec.values() if isinstance(spec, Mapping) else [spec]
+  if not all(isinstance(part, specs.Array) for part in parts):
+    raise ValueError(f"observations are {spec}; valid: an array, or named ones")
   if not isinstance(spec, Mapping):
     return lambda observation: np.asarray(observation, np.float32).ravel()
   if observations.OBSERVATION_SLICES.keys() <= spec.keys():
@@ -52,6 +57,49 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   return flatten
 
 
+def with_unit_actions(environment: dm_env.Environment) -> dm_env.Environment:
+  """The environment, with actions as agents choose them: [A] in [-1, 1].
+
+  They are reshaped and scaled linearly to its own action spec. Raises
+  ValueError if that is not of floats with finite bounds.
+  """
+  spec: Any = environment.action_spec()
+  if (
+    not isinstance(spec, specs.BoundedArray)
+    or not np.issubdtype(spec.dtype, np.floating)
+    or not np.isfinite(spec.maximum - spec.minimum).all()
+  ):
+    raise ValueError(f"actions are {spec}; valid: floats with finite bounds")
+  is_unit = np.all(spec.minimum == -1) and np.all(spec.maximum == 1)
+  if is_unit and len(spec.shape) == 1:
+    return environment
+  return _UnitActions(environment, spec)
+
+
+class _UnitActions:
+  """An environment whose actions are rescaled; all else is its own."""
+
+  def __init__(self, environment: Any, spec: specs.BoundedArray):
+    self._environment, self._spec = environment, spec
+
+  def __getattr__(self, name: str) -> Any:
+    if name.startswith("__"):
+      raise AttributeError(name)
+    return getattr(self._environment, name)
+
+  def action_spec(self) -> specs.BoundedArray:
+    """[A] in [-1, 1]."""
+    size = int(np.prod(self._spec.shape))
+    return specs.BoundedArray((size,), np.float32, -1.0, 1.0, "action")
+
+  def step(self, action: np.ndarray) -> dm_env.TimeStep:
+    """A step by an action in [-1, 1]^A."""
+    low, high = self._spec.minimum, self._spec.maximum
+    share = (np.clip(np.reshape(action, self._spec.shape), -1, 1) + 1) / 2
+    scaled = (1 - share) * low + share * high
+    return self._environment.step(scaled.astype(self._spec.dtype))
+
+
 def reseeded(
   environment: dm_env.Environment,
   make_environment: Callable[..., dm_env.Environment],
@@ -70,13 +118,13 @@ def reseeded(
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
   """The sizes (O, A) of flat observations and of actions."""
-  spec: Any = environment.observation_spec()
+  flatten, spec = flattener(environment), environment.observation_spec()
   if isinstance(spec, Mapping):
     example: Any = {name: np.zeros(part.shape) for name, part in spec.items()}
   else:
     example = np.zeros(spec.shape)
   action_size = int(np.prod(environment.action_spec().shape))
-  return len(flattener(environment)(example)), action_size
+  return len(flatten(example)), action_size
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:

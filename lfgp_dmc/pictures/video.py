@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from lfgp_dmc.data import files
 
-FORMATS = (".mp4", ".gif", ".png")
+FORMATS = (".mp4", ".gif", ".webp", ".png")
 
 
 def write(
@@ -22,7 +22,7 @@ def write(
   """Writes frames and, beside them, `NAME.json`; returns the path.
 
   Args:
-    path: `.mp4`, `.gif`, or `.png` (all frames side by side: a film strip).
+    path: `.mp4`, `.gif`, `.webp`, or `.png` (a film strip, side by side).
     frames: at least one, uint8 [height, width, 3], all of one size.
     fps: frames a second.
     metadata: for the sidecar, beside size and rate.
@@ -40,7 +40,7 @@ def write(
   with files.replacing(path) as aside:
     if suffix == ".png":
       imageio.imwrite(aside, np.concatenate(frames, axis=1))
-    elif suffix == ".gif":
+    elif suffix in (".gif", ".webp"):
       imageio.mimwrite(aside, frames, duration=1000 / fps, loop=0)
     else:
       # yuv420p halves the colours' resolution: sides must be even.

@@ -72,6 +72,11 @@ class ActingTest(absltest.TestCase):
     mean = policy.act(row, deterministic=True)
     np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
 
+  def test_observations_of_another_width_are_refused(self):
+    for shape in ((OBS + 1,), (2, OBS - 1), (), (1, 1, OBS)):
+      with self.assertRaisesRegex(ValueError, rf"valid: \({OBS},\) or \(B, "):
+        _policy().act(np.zeros(shape, np.float32))
+
   def test_unknown_task_is_refused_with_the_valid_ones(self):
     policy = _policy()
     for call in (

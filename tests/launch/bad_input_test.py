@@ -1,6 +1,7 @@
 """Bad input to the commands: one clear line, and nothing left behind."""
 
 import os
+from unittest import mock
 
 from tests.fixtures import FolderTest
 from tests.launch import fixtures
@@ -46,6 +47,25 @@ _COLLECTION = (
   ("", "--output is not set"),
   ("--output=old", "--output=old exists; valid: a new folder"),
 )
+
+
+class ArgumentsTest(FolderTest):
+  def test_home_folders_are_expanded_in_flagfiles_too(self):
+    (self.folder / "my.flags").write_text("--runs=~/a,~/b~c\n")
+    with mock.patch.dict(os.environ, HOME=str(self.folder / "home")):
+      done = fixtures.call("plot.py --flagfile=my.flags", self.folder)
+    self.assertEqual(
+      done.stderr, f"error: no run folder {self.folder}/home/a\n"
+    )
+
+  def test_a_locale_that_cannot_hold_a_path(self):
+    line = "evaluate.py --expert=scripted --run=runs/\udcc3\udcb6"
+    variables = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
+    with mock.patch.dict(os.environ, variables):
+      done = fixtures.call(line, self.folder, fresh=True)
+    self.assertEqual(done.returncode, 1)
+    self.assertIn(r"error: --run=runs/\udcc3\udcb6 is not text", done.stderr)
+    self.assertEqual(done.stderr.count("\n"), 1)
 
 
 class BadInputTest(FolderTest):

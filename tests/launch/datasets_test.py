@@ -1,6 +1,9 @@
 """The demonstrations of a run, from several kinds of folders."""
 
 import pathlib
+import shlex
+import subprocess
+from unittest import mock
 
 import numpy as np
 
@@ -25,6 +28,23 @@ class DatasetsTest(fixtures.RunTest):
       shown = datasets.load(config, ["stack", "move_object"], (59, 4))
       self.assertLen(shown["stack"], pairs)
       self.assertLen(shown["move_object"], 15)
+
+  def test_collects_into_a_folder_with_blanks(self):
+    folder = self.folder / "it's mine; really"
+    config = self.config(
+      demonstrations=str(folder), collect_pairs=30, environment="",
+      main_task="lift",
+    )  # fmt: skip
+    done = mock.Mock(returncode=1)
+    with (
+      mock.patch.object(subprocess, "run", return_value=done) as run,
+      mock.patch("builtins.print") as printed,
+      self.assertRaisesRegex(UserError, "could not be collected"),
+    ):
+      datasets.load(config, ["lift"], (59, 4))
+    self.assertIn(f"--output={folder}", run.call_args.args[0])
+    shown = shlex.split(printed.call_args.args[0].partition(": ")[2])
+    self.assertEqual(shown[2:], run.call_args.args[0][2:])
 
   def test_published_examples_are_read_like_a_dataset(self):
     data = pathlib.Path(__file__).parents[1] / "data"

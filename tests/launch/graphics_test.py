@@ -7,6 +7,7 @@ from unittest import mock
 
 from absl.testing import absltest, parameterized
 
+import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.launch import set_up_graphics
 
@@ -40,11 +41,49 @@ class ChooseBackendTest(parameterized.TestCase):
   def test_nothing_is_loaded_where_no_picture_is_needed(self):
     self.assertEqual(_in_new_process("render=False")[:2], ["off", "off"])
 
-  @parameterized.parameters("egl", "osmesa", "glfw", "off")
-  def test_what_the_user_set_is_kept(self, backend):
-    found = _in_new_process(MUJOCO_GL=backend, PYOPENGL_PLATFORM="x11")
-    platform = backend if backend in ("egl", "osmesa") else "x11"
-    self.assertEqual(found, [backend, backend, platform])
+  @parameterized.parameters(
+    ("egl", "egl"),
+    ("EGL", "egl"),
+    ("GLFW ", "glfw"),
+    ("1", "glfw"),
+    ("0", "off"),
+  )
+  @mock.patch.object(graphics, "_egl_works", lambda: True)
+  def test_what_the_user_set_is_kept(self, given, backend):
+    variables = {"MUJOCO_GL": given, "PYOPENGL_PLATFORM": "x11"}
+    with (
+      mock.patch.dict(os.environ, variables, clear=True),
+      mock.patch.dict(sys.modules),
+    ):
+      sys.modules.pop("dm_control._render", None)
+      self.assertEqual(graphics.choose_backend(), backend)
+      self.assertEqual(os.environ["MUJOCO_GL"], backend)
+      platform = backend if backend == "egl" else "x11"
+      self.assertEqual(os.environ["PYOPENGL_PLATFORM"], platform)
+
+  @parameterized.parameters(
+    ("nonsense", "valid: glfw, egl"), ("osmesa", "no OSMesa: unset it")
+  )
+  @mock.patch.object(graphics, "_osmesa_works", lambda: False)
+  def test_what_cannot_be_is_refused(self, backend, message):
+    with (
+      mock.patch.dict(os.environ, {"MUJOCO_GL": backend}),
+      self.assertRaisesRegex(ValueError, message),
+    ):
+      graphics.choose_backend()
+
+  @parameterized.parameters("77", "x")
+  def test_an_egl_device_that_is_not_there(self, device):
+    with mock.patch.dict(
+      os.environ, MUJOCO_GL="egl", MUJOCO_EGL_DEVICE_ID=device
+    ):
+      self.assertFalse(graphics._egl_works.__wrapped__())
+      with mock.patch.object(graphics, "_egl_works", lambda: False):
+        self.assertIn("unset MUJOCO_EGL_DEVICE_ID", graphics.fault())
+
+  def test_a_display_that_is_gone(self):
+    with mock.patch.dict(os.environ, MUJOCO_GL="glfw", DISPLAY=":9876"):
+      self.assertIn("there is no display", graphics.fault())
 
   @parameterized.parameters((True, "osmesa"), (False, "off"))
   @mock.patch.dict(os.environ, clear=True)
@@ -65,6 +104,40 @@ class ChooseBackendTest(parameterized.TestCase):
       mock.patch.object(graphics, "works_without_display", lambda: has_egl),
     ):
       self.assertIn(message, graphics.fault())
+
+
+class FirstImportTest(parameterized.TestCase):
+  @parameterized.parameters(
+    "import mujoco, OpenGL.GL",
+    "from dm_control import mujoco",
+    "import lfgp_dmc.gymnasium",
+  )
+  def test_pictures_after(self, first):
+    if not graphics.works_without_display():
+      self.skipTest("neither EGL nor OSMesa works")
+    code = (
+      f"{first}\nimport lfgp_dmc\n"
+      "env = lfgp_dmc.load('reach', 0, observations='vision')\n"
+      "assert env.reset().observation['camera/front'].std() > 0\n"
+    )
+    if "gymnasium" in first:
+      code = (
+        f"import gymnasium\n{first}\n"
+        "env = gymnasium.make('lfgp_dmc/Reach-v0', render_mode='rgb_array')\n"
+        "env.reset()\nassert env.render().std() > 0\n"
+      )
+    names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
+    clean = {k: v for k, v in os.environ.items() if k not in names}
+    done = subprocess.run(
+      [sys.executable, "-c", code], env=clean, capture_output=True, text=True
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+
+  @mock.patch.dict(os.environ, MUJOCO_GL="off")
+  @mock.patch.object(graphics, "choose_backend", lambda: "off")
+  def test_vision_without_pictures_is_refused(self):
+    with self.assertRaisesRegex(ValueError, "MUJOCO_GL is 'off'"):
+      lfgp_dmc.load("reach", observations="vision")
 
 
 class SetUpGraphicsTest(absltest.TestCase):

@@ -106,3 +106,8 @@ class CheckActionTest(parameterized.TestCase):
   def test_a_wrong_shape_is_named(self, action):
     with self.assertRaisesRegex(ValueError, r"shape.*valid is \(4,\)"):
       control.check_action(action)
+
+  @parameterized.parameters(np.nan, np.inf, -np.inf)
+  def test_what_is_not_finite_is_refused(self, value):
+    with self.assertRaisesRegex(ValueError, "is not finite"):
+      control.check_action([value, 0.0, 0.0, 0.0])

@@ -1,6 +1,8 @@
 """The environment contract, on all nine tasks."""
 
+import copy
 import functools
+import pickle
 
 import numpy as np
 from absl.testing import parameterized
@@ -23,8 +25,9 @@ class AllTasksTest(parameterized.TestCase):
     self.assertIsInstance(env, composer.Environment)
     spec = env.action_spec()
     self.assertEqual(spec.shape, (4,))
-    np.testing.assert_array_equal(spec.minimum, -1.0)
-    np.testing.assert_array_equal(spec.maximum, 1.0)
+    np.testing.assert_array_equal(spec.minimum, [-1.0] * 4)
+    self.assertEqual(spec.minimum.shape, (4,))
+    np.testing.assert_array_equal(spec.maximum, [1.0] * 4)
     timestep = env.reset()
     self.assertTrue(timestep.first())
     observed, expected = timestep.observation, env.observation_spec()
@@ -106,10 +109,25 @@ class EpisodeTest(parameterized.TestCase):
     first.reseed(8)
     self.assertFalse(np.array_equal(played, play(first)))
 
+  @parameterized.parameters(
+    copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))
+  )
+  def test_a_copy_goes_on_as_the_original_does(self, copied):
+    env = lfgp_dmc.load("lift", 3, time_limit=0.1, reward="dense")
+    env.reset()
+    other = copied(env)
+    self.assertTrue(other.needs_reset)
+    for one in (env, other):
+      self.assertTrue(one.reset().first())
+      self.assertFalse(one.step(KEEP).last())
+    last, same = env.step(KEEP), other.step(KEEP)
+    self.assertTrue(last.last() and same.last())
+    self.assertEqual(last.reward, same.reward)
+
   def test_a_bad_action_is_refused_and_the_episode_goes_on(self):
     env = fixtures.fresh()
     env.reset()
-    with self.assertRaisesRegex(ValueError, "NaN"):
+    with self.assertRaisesRegex(ValueError, "not finite"):
       env.step([np.nan, 0, 0, 0])
     with self.assertRaisesRegex(ValueError, "shape"):
       env.step([0, 0, 0])

@@ -1,5 +1,6 @@
 """The nine tasks through Gymnasium, by Gymnasium's own checker."""
 
+import copy
 import importlib.util
 import unittest
 import warnings
@@ -82,6 +83,18 @@ class GymnasiumTest(parameterized.TestCase):
       alone.reset()
       expected = lfgp_dmc.flatten(alone.step(action).observation)
       np.testing.assert_allclose(found, expected, atol=1e-6)
+
+  def test_a_step_after_the_end_asks_for_a_reset_and_copies_are_new(self):
+    env = gymnasium.make(_IDS["reach"], time_limit=0.05)
+    env.reset(seed=0)
+    *_, truncated, _ = env.step(np.zeros(4, np.float32))
+    self.assertTrue(truncated)
+    with self.assertRaisesRegex(gymnasium.error.ResetNeeded, r"call reset\(\)"):
+      env.step(np.zeros(4, np.float32))
+    other = copy.deepcopy(env)
+    np.testing.assert_array_equal(env.reset(seed=1)[0], other.reset(seed=1)[0])
+    *_, truncated, _ = other.step(np.zeros(4, np.float32))
+    self.assertTrue(truncated)
 
   def test_success_is_reported_and_does_not_end_the_episode(self):
     env = gymnasium.make(_IDS["reach"])

@@ -19,7 +19,7 @@ def _frames(count=8, height=47, width=63):
 
 
 class VideoTest(FolderTest):
-  @parameterized.parameters("clip.mp4", "clip.gif")
+  @parameterized.parameters("clip.mp4", "clip.gif", "clip.webp")
   def test_clip_plays_back(self, name):
     path = video.write(self.folder / "new" / name, _frames(), 20, {"seed": 3})
     read = imageio.mimread(path)
@@ -54,7 +54,7 @@ class VideoTest(FolderTest):
   def test_bad_input_is_named(self):
     frames = _frames()
     for name, bad, message in (
-      ("a.avi", frames, "valid: .mp4, .gif, .png"),
+      ("a.avi", frames, "valid: .mp4, .gif, .webp, .png"),
       ("a.mp4", [], "no frames"),
       ("a.mp4", [frames[0] / 255.0], "float64"),
       ("a.mp4", [frames[0], frames[0][1:]], "two sizes"),
