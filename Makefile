@@ -31,7 +31,7 @@ demo: setup
 	$(BIN)/python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
 test: setup
-	$(BIN)/python -m pytest tests
+	$(BIN)/python -m pytest -n 2 --dist=worksteal tests
 
 # mypy does not read how pyproject.toml maps folders to import names: it gets a
 # folder of links in which they are laid out so.

@@ -124,7 +124,7 @@ class BlockRunTest(absltest.TestCase):
       self.skipTest(graphics.fault())
     size = "--height=64 --width=64 --steps=10 --every=5"
     for suffix, task in zip(
-      video.FORMATS, ("reach", "scheduled", "bring"), strict=True
+      video.FORMATS, ("reach", "scheduled", "bring", "lift"), strict=True
     ):
       done = self._call(f"render_policy.py --run=runs/tiny --task={task} "
                         f"{size} --output=clip_{task}{suffix}")  # fmt: skip
