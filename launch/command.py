@@ -11,10 +11,12 @@ from absl import app, flags
 from absl import logging as absl_logging
 
 from lfgp_dmc import graphics
+from lfgp_dmc.acting.workers import LostWorkerError
+from lfgp_dmc.runs import signals
 
 _T = TypeVar("_T", str, int)
 
-INTERRUPTED = 130  # exit status after SIGINT or SIGTERM
+INTERRUPTED = 130  # exit status after SIGINT, SIGTERM or SIGHUP
 
 
 class UserError(Exception):
@@ -38,6 +40,7 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
+  signals.interrupt_once()
   graphics.choose_backend(render, window)
   absl_logging.get_absl_handler().addFilter(_is_relevant)
   _show_help_of(main.__module__)
@@ -45,7 +48,10 @@ def run(
   def guarded_main(argv: Sequence[str]) -> int | None:
     if len(argv) > 1:
       return _fail(f"unexpected argument {argv[1]!r}; flags start with --")
-    return guarded(main)
+    try:
+      return guarded(main)
+    finally:
+      signals.ignore()
 
   def parse(argv: Sequence[str]) -> list[str]:
     try:
@@ -75,6 +81,10 @@ def guarded(main: Callable[[], int | None]) -> int | None:
     return 1
   except OSError as error:
     return _fail(str(error))
+  except LostWorkerError as error:
+    own = "workers" in flags.FLAGS
+    flag = "--workers" if own else "--config.evaluation_workers"
+    return _fail(f"{error}; fewer processes need less: {flag}=1")
   except KeyboardInterrupt:
     print("\ninterrupted", file=sys.stderr)
     return INTERRUPTED

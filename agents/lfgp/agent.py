@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import tqdm
 
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import transfer
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
@@ -19,6 +18,7 @@ from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
 from lfgp_dmc.data import files
+from lfgp_dmc.runs import signals
 from lfgp_dmc.types import Episode, Metrics
 
 
@@ -112,7 +112,11 @@ class LfgpAgent:
       self._first_updates = updates
 
   def prepare(self, progress_bar: bool = False) -> None:
-    """Makes the updates that are due before the first step, if any."""
+    """Makes the updates that are due before the first step, if any.
+
+    Raises:
+      StopRequestedError: see `signals.poll`, called before each update.
+    """
     if self._has_started:
       return
     learner = self.learner
@@ -125,12 +129,13 @@ class LfgpAgent:
       learner.prior.warn_if_precise(
         self.tasks, self._experts, learner.intentions.target_entropy
       )
-    for _ in tqdm.trange(
-      self._first_updates,
+    for _ in progress_bars.bar(
+      range(self._first_updates),
       desc="on the other run's replay",
       unit="update",
-      disable=not (progress_bar and self._first_updates),
+      show=progress_bar and self._first_updates > 0,
     ):
+      signals.poll()
       self.update()
     self._has_started = True
 

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-import tqdm
 
+from lfgp_dmc import progress_bars
 from lfgp_dmc.agents.cloning import IntentionCloner
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import PretrainingConfig
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
+from lfgp_dmc.runs import signals
 
 _LOG_EVERY = 1000  # updates between readings of the loss
 
@@ -31,7 +32,11 @@ class Pretraining:
     generator: np.random.Generator,
     progress_bar: bool = False,
   ) -> None:
-    """Makes all updates, if there are any; the trunk is the intentions' own."""
+    """Makes all updates, if there are any; the trunk is the intentions' own.
+
+    Raises:
+      StopRequestedError: see `signals.poll`, called before each update.
+    """
     config = self.config
     if not config.updates:
       return
@@ -40,14 +45,14 @@ class Pretraining:
       intentions, config.learning_rate, self.optimiser, config.loss, self.dtype
     )
     cloner.anneal(config.updates)
-    updates = tqdm.trange(
-      1,
-      config.updates + 1,
+    updates = progress_bars.bar(
+      range(1, config.updates + 1),
       desc="pretraining",
       unit="update",
-      disable=not progress_bar,
+      show=progress_bar,
     )
     for update in updates:
+      signals.poll()
       metrics = cloner.update(experts.sample(generator, self.batch_size))
       if update % _LOG_EVERY == 0:
         loss = float(metrics["loss/behaviour_cloning"])

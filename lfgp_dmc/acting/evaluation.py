@@ -9,13 +9,13 @@ import functools
 from collections.abc import Callable, Sequence
 
 import dm_env
-import tqdm
 from absl import logging
 
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.acting import workers as work
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
+from lfgp_dmc.runs import signals
 from lfgp_dmc.types import Actor
 
 
@@ -41,6 +41,10 @@ def evaluate(
     workers: processes; 1 plays in this one.
     progress: whether to show a bar.
     env_step: goes into the rows, which come task by task.
+
+  Raises:
+    LostWorkerError: a process was killed.
+    StopRequestedError: see `signals.poll`, called after each episode.
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
@@ -48,16 +52,23 @@ def evaluate(
     _Player, make_environment, make_actor, seed, env_step
   )
   results = work.ordered(make_player, jobs, workers)
-  bar = tqdm.tqdm(
-    results,
-    total=len(jobs),
-    desc="evaluating",
-    unit="episode",
-    disable=not progress,
-    leave=False,
-  )
-  with contextlib.closing(results):
-    return list(bar)
+  rows: list[EvaluationRow] = []
+  with (
+    progress_bars.bar(
+      total=len(jobs),
+      desc="evaluating",
+      unit="episode",
+      show=progress,
+      leave=False,
+    ) as bar,
+    contextlib.closing(results),
+  ):
+    signals.poll()
+    for row in results:
+      rows.append(row)
+      bar.update()
+      signals.poll()
+  return rows
 
 
 class _Player:

@@ -1,15 +1,19 @@
 """Work shared among processes, with results in the order of the jobs."""
 
 import collections
-import concurrent.futures
 import contextlib
 import itertools
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
-from typing import Any
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from multiprocessing import resource_tracker
+from typing import Any, NamedTuple
+
+from lfgp_dmc.runs import signals
 
 # Set before a worker imports anything.
 _VARIABLES = {
@@ -19,6 +23,18 @@ _VARIABLES = {
   "OMP_WAIT_POLICY": "PASSIVE",
   "MUJOCO_GL": "off",
 }
+_PATIENCE = 0.5  # s, for processes that are ending
+
+
+class LostWorkerError(RuntimeError):
+  """A worker process died without an answer."""
+
+
+class _Worker(NamedTuple):
+  """A process and our end of its pipe."""
+
+  process: Any
+  connection: Any
 
 
 def ordered(
@@ -32,9 +48,13 @@ def ordered(
     make_state: called once in each process, such as for an environment; its
       result does the jobs, and may have a `close`. With several workers it must
       be picklable, and so must jobs and results.
-    jobs: finite or endless: a few are in flight, and closing the generator
-      ends the processes.
-    workers: processes; 1 works in this one.
+    jobs: small; finite or endless: a few are in flight, and closing the
+      generator ends the processes.
+    workers: processes; 1 works in this one. They get no signals: what is sent
+      to all of a job is this process's to handle.
+
+  Raises:
+    LostWorkerError: a process was killed. What a job raises is raised as is.
   """
   if workers == 1:
     state = make_state()
@@ -44,42 +64,89 @@ def ordered(
       if hasattr(state, "close"):
         state.close()
     return
-  jobs = iter(jobs)
-  with _variables():
-    pool = concurrent.futures.ProcessPoolExecutor(
-      workers,
-      mp_context=multiprocessing.get_context("spawn"),
-      initializer=_start,
-      initargs=(make_state,),
-    )
+  crew: list[_Worker] = []
+  try:
+    with _variables(), signals.held():
+      resource_tracker.ensure_running()  # lets signals through again
+      with signals.held():
+        crew.extend(_start(make_state) for _ in range(workers))
+    yield from _shared(crew, jobs)
+  finally:
+    with signals.held():
+      _end(crew)
+
+
+def _start(make_state: Callable[[], Callable[[Any], Any]]) -> _Worker:
+  context = multiprocessing.get_context("spawn")
+  ours, theirs = context.Pipe()
+  process = context.Process(target=_serve, args=(make_state, theirs))
+  process.start()
+  theirs.close()  # so that its death ends what we read
+  return _Worker(process, ours)
+
+
+def _shared(crew: Sequence[_Worker], jobs: Iterable[Any]) -> Iterator[Any]:
+  """Hands the jobs out in turn, two a worker; yields results in order."""
+  turns = zip(jobs, itertools.cycle(crew), strict=False)
+  flying: collections.deque[_Worker] = collections.deque()
+
+  def hand_out(count: int) -> None:
+    for job, worker in itertools.islice(turns, count):
+      with contextlib.suppress(OSError):  # it is dead, and found so below
+        worker.connection.send(job)
+      flying.append(worker)
+
+  hand_out(2 * len(crew))
+  while flying:
+    worker = flying.popleft()
     try:
-      flying = collections.deque(
-        pool.submit(_work, job) for job in itertools.islice(jobs, 2 * workers)
-      )
-      while flying:
-        result = flying.popleft().result()
-        flying.extend(
-          pool.submit(_work, job) for job in itertools.islice(jobs, 1)
-        )
-        yield result
-    finally:
-      pool.shutdown(cancel_futures=True)
+      is_done, result = worker.connection.recv()
+    except (EOFError, OSError):
+      raise LostWorkerError(_fate(worker.process)) from None
+    hand_out(1)
+    if not is_done:
+      raise result
+    yield result
 
 
-_state: Callable[[Any], Any] | None = None  # one in each worker process
+def _fate(process) -> str:
+  process.join(_PATIENCE)
+  status = process.exitcode or 0
+  if status >= 0:
+    return f"a worker process ended with exit status {status}"
+  name = signal.Signals(-status).name
+  why = ", as by the kernel when memory runs out" if name == "SIGKILL" else ""
+  return f"a worker process was killed by {name}{why}"
 
 
-def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
-  """Initialises a worker: it ignores SIGINT and exits with its parent."""
-  global _state
-  signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _end(crew: Sequence[_Worker]) -> None:
+  """Ends the workers: idle ones by themselves, busy ones by force."""
+  deadline = time.monotonic() + _PATIENCE
+  for worker in crew:
+    worker.connection.close()
+  for worker in crew:
+    worker.process.join(max(0.0, deadline - time.monotonic()))
+    worker.process.kill()
+  for worker in crew:
+    worker.process.join()
+
+
+def _serve(make_state: Callable[[], Callable[[Any], Any]], connection) -> None:
+  """A worker's life; it ends with its parent, or when that hangs up."""
   threading.Thread(target=_end_with_parent, daemon=True).start()
-  _state = make_state()
-
-
-def _work(job: Any) -> Any:
-  assert _state is not None
-  return _state(job)
+  state: Any = None
+  with contextlib.suppress(EOFError, OSError):
+    while True:
+      job = connection.recv()
+      try:
+        state = make_state() if state is None else state
+        answer = True, state(job)
+      except Exception as error:  # the parent raises it
+        error.add_note(f"in a worker process:\n{traceback.format_exc()}")
+        answer = False, error
+      connection.send(answer)
+  if hasattr(state, "close"):
+    state.close()
 
 
 def _end_with_parent() -> None:

@@ -5,11 +5,13 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
-import tqdm
+from absl import logging
 
+from lfgp_dmc import progress_bars
+from lfgp_dmc.acting import workers
+from lfgp_dmc.runs import signals
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
-from lfgp_dmc.runs.signals import stop_request
 from lfgp_dmc.types import Agent, Metrics
 
 EvaluateFn = Callable[[int], Mapping[str, float]]
@@ -20,8 +22,8 @@ _Agent = TypeVar("_Agent", bound=Agent)
 class Rounds(abc.ABC, Generic[_Agent]):
   """Trains by rounds, an episode or an epoch each, until the run's end.
 
-  Evaluations and checkpoints fall on ends of rounds. SIGINT or SIGTERM finishes
-  the round and writes a checkpoint, without rows or an evaluation that were not
+  Evaluations and checkpoints fall on ends of rounds. A signal finishes the
+  round, not an evaluation, and writes a checkpoint, without rows that were not
   due, so that the resumed run equals one never stopped.
   """
 
@@ -35,7 +37,7 @@ class Rounds(abc.ABC, Generic[_Agent]):
     progress: Progress | None = None,
   ):
     """Starts the clock; `progress` is of a checkpoint that is resumed."""
-    self.progress = progress or Progress()
+    self.progress = progress or Progress(evaluation_due=schedule.evaluate_first)
     self._agent = agent
     self._schedule = schedule
     self._log = log
@@ -52,32 +54,70 @@ class Rounds(abc.ABC, Generic[_Agent]):
     Args:
       evaluate_fn: env_step -> success rate by task; writes its own rows.
       checkpoint_fn: stores the agent, its data and the progress it is given.
+
+    Raises:
+      LostWorkerError: in an evaluation; there is a checkpoint.
     """
     schedule, progress = self._schedule, self.progress
     progress.is_complete |= progress.env_step >= schedule.env_steps
-    self._bar = tqdm.tqdm(
+    self._bar = progress_bars.bar(
       total=schedule.env_steps,
       initial=progress.env_step,
+      desc="training",
       unit=self._unit,
-      disable=not schedule.progress_bar,
+      show=schedule.progress_bar,
       mininterval=1.0,
     )
-    with self._bar, stop_request() as stop:
-      self._begin()
-      if schedule.evaluate_first and evaluate_fn and not progress.env_step:
-        self._evaluate(evaluate_fn)
+    with self._bar, signals.stop_request() as stop:
+      try:
+        self._begin()
+      except signals.StopRequestedError:
+        logging.warning(
+          "stopped before the first step: nothing is stored, and a resumed run "
+          "starts anew"
+        )
+        return progress
+      if progress.evaluation_due or stop:
+        due = progress.is_complete
+        self._close_round(evaluate_fn, checkpoint_fn, due, stop)
       while not progress.is_complete and not stop:
         before = progress.env_step
         self._round()
         step, final = progress.env_step, progress.is_complete
-        due = final or passed(before, step, schedule.evaluate_every)
-        if due and evaluate_fn:
-          self._evaluate(evaluate_fn)
+        evaluate_every = schedule.evaluate_every
+        progress.evaluation_due = final or passed(before, step, evaluate_every)
         due = final or passed(before, step, schedule.checkpoint_every)
-        if (due or stop) and checkpoint_fn:
-          progress.wall_s = self._elapsed()
-          checkpoint_fn(progress)
+        self._close_round(evaluate_fn, checkpoint_fn, due, stop)
+    if progress.evaluation_due:  # left for a resumed run
+      progress.is_complete = False
     return progress
+
+  def _close_round(
+    self,
+    evaluate_fn: EvaluateFn | None,
+    checkpoint_fn: CheckpointFn | None,
+    is_due: bool,
+    stop: signals.StopRequest,
+  ) -> None:
+    """Evaluates if that is due; makes a checkpoint if it is due or one stops.
+
+    An evaluation that a stop or the loss of a process ends is left to the
+    resumed run.
+    """
+    progress, lost = self.progress, None
+    try:
+      if progress.evaluation_due and evaluate_fn:
+        self._evaluate(evaluate_fn)
+      progress.evaluation_due = False
+    except signals.StopRequestedError:
+      pass
+    except workers.LostWorkerError as error:
+      lost = error
+    if (is_due or stop or lost) and checkpoint_fn:
+      progress.wall_s = self._elapsed()
+      checkpoint_fn(progress)
+    if lost and not stop:
+      raise lost
 
   def _begin(self) -> None:
     """Work before the first round, if any."""

@@ -57,7 +57,7 @@ class Run:
     self._config = config
     self._seed = seed
     self._log = MetricsLog(folder.path)
-    self._progress = Progress()
+    self._progress = Progress(evaluation_due=schedule.evaluate_first)
 
   def train(self) -> Progress:
     """Trains to the end or to a signal; see `Rounds`."""
@@ -106,6 +106,8 @@ class Run:
     if self.replay is not None:
       _rewind(self.replay, replay_total)
     self._log.truncate_after(last_step)
+    if self._progress.evaluation_due:  # rows of here may be there already
+      last_step -= 1
     csv_files.truncate_after(folder.evaluation, last_step)
     return path is not None
 

@@ -1,17 +1,24 @@
 """A run from its config to its files, continued, and refused."""
 
+import signal
 from unittest import mock
 
 import numpy as np
 from absl.testing import parameterized
 
 import lfgp_dmc
+from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.runs import run, run_folder
+from lfgp_dmc.runs import run, run_folder, signals
 from lfgp_dmc.runs.schedule import Progress
 from tests import fixtures as shared
 from tests.launch import fixtures
+
+_WARM_START = {
+  "agent.pretraining.updates": 5,
+  "agent.networks.actor_trunk": "own",
+}
 
 
 class TrainingTest(fixtures.RunTest):
@@ -30,6 +37,40 @@ class TrainingTest(fixtures.RunTest):
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
+
+  @parameterized.parameters(1, 9)  # episodes: of the first, of the last one
+  def test_a_stop_in_an_evaluation_changes_no_number(self, episodes):
+    changes = {"evaluate_first": True, **_WARM_START}
+    config = self.config(**changes)
+    whole, _ = self.train(config, "whole")
+    real, played = evaluation._Player.__call__, []
+
+    def play_and_stop(player, job):
+      played.append(job)
+      if len(played) == episodes:
+        signal.raise_signal(signal.SIGTERM)
+      return real(player, job)
+
+    with mock.patch.object(evaluation._Player, "__call__", play_and_stop):
+      path, progress = self.train(config, "stopped")
+    self.assertLen(played, episodes)
+    self.assertFalse(progress.is_complete)
+    self.assertNotEmpty(list((path / "checkpoints").iterdir()))
+    _, resumed = self.train(config, "stopped", resume=True)
+    self.assertTrue(resumed.is_complete)
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
+
+  def test_a_stop_in_the_warm_start_starts_anew(self):
+    config = self.config(**_WARM_START)
+    whole, _ = self.train(config, "whole")
+    with mock.patch.object(
+      signals, "poll", side_effect=signals.StopRequestedError
+    ):
+      path, progress = self.train(config, "stopped")
+    self.assertEqual(progress.update, 0)
+    self.assertFalse((path / "checkpoints").exists())
+    self.train(config, "stopped", resume=True)
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_another_config_is_not_resumed(self):
     self.train(self.config(env_steps=40))
