@@ -10,7 +10,7 @@ sys.path[:] = [p for p in sys.path if not p or os.path.realpath(p) != _HERE]
 
 
 def _report(kind, error, trace):
-  """Reports an interrupt in a line also while the commands are imported."""
+  """In a line also if it comes while the commands are imported."""
   if issubclass(kind, KeyboardInterrupt):
     print("\ninterrupted", file=sys.stderr)
   else:

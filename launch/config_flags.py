@@ -7,6 +7,7 @@ before the flag `config` is defined with them.
 
 import sys
 from collections.abc import Sequence
+from typing import Any
 
 from absl import flags
 from ml_collections import config_flags
@@ -65,10 +66,12 @@ def resolved(
   return configs.from_dict(flag_values.config.to_dict())
 
 
-def is_given() -> bool:
-  """Whether a preset or any setting was given, in a flagfile or not."""
-  overrides = config_flags.get_override_values(flags.FLAGS["config"])
-  return bool(overrides) or flags.FLAGS["preset"].present > 0
+def given() -> dict[str, Any]:
+  """The settings, and the preset, that were given, in a flagfile or not."""
+  found = dict(config_flags.get_override_values(flags.FLAGS["config"]))
+  if flags.FLAGS["preset"].present:
+    found["preset"] = flags.FLAGS["preset"].value
+  return found
 
 
 def _name(argument: str) -> str:

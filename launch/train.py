@@ -68,11 +68,12 @@ def _config() -> configs.RunConfig:
       return config_flags.resolved()
     if not _RUN.value:
       raise UserError("--resume needs --run: the folder to continue")
-    if config_flags.is_given():
+    given = config_flags.given()
+    if set(given) - {training.MAY_CHANGE}:
       return config_flags.resolved()
     stored = run_folder.read_config(_RUN.value)
     try:
-      return configs.from_dict(run_folder.settings(stored))
+      return configs.from_dict(run_folder.settings(stored) | given)
     except ValueError as error:
       raise UserError(f"{_RUN.value}/config.json: {error}") from None
 

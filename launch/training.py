@@ -1,5 +1,6 @@
 """Trains by a config, in a run's folder: new, or continued."""
 
+import functools
 import pathlib
 import shutil
 from typing import Any
@@ -14,6 +15,8 @@ from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
+
+MAY_CHANGE = "evaluation_workers"  # when a run is resumed: it changes no number
 
 
 def train(
@@ -40,7 +43,8 @@ def train(
     )
   with command.checked_input():
     if resume:
-      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
+      complete = functools.partial(_completed, config)
+      folder = run_folder.resume(path, config.to_dict(), complete)
     else:
       folder = run_folder.create(path, config.to_dict())
   try:
@@ -64,8 +68,10 @@ def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
   agent.save_policy(folder, config.to_dict(), env_step=0)
 
 
-def _with_newer_fields(stored: dict[str, Any]) -> dict[str, Any]:
-  return from_dict(stored).to_dict()
+def _completed(config: RunConfig, stored: dict[str, Any]) -> dict[str, Any]:
+  """A stored config with newer fields, and with what may change."""
+  changed = {MAY_CHANGE: getattr(config, MAY_CHANGE)}
+  return from_dict(stored).to_dict() | changed
 
 
 def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:

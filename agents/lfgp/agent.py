@@ -112,11 +112,7 @@ class LfgpAgent:
       self._first_updates = updates
 
   def prepare(self, progress_bar: bool = False) -> None:
-    """Makes the updates that are due before the first step, if any.
-
-    Raises:
-      StopRequestedError: see `signals.poll`, called before each update.
-    """
+    """Makes the updates that are due before the first step, if any."""
     if self._has_started:
       return
     learner = self.learner

@@ -32,11 +32,7 @@ class Pretraining:
     generator: np.random.Generator,
     progress_bar: bool = False,
   ) -> None:
-    """Makes all updates, if there are any; the trunk is the intentions' own.
-
-    Raises:
-      StopRequestedError: see `signals.poll`, called before each update.
-    """
+    """Makes all updates, if there are any; the trunk is the intentions' own."""
     config = self.config
     if not config.updates:
       return

@@ -95,7 +95,7 @@ def _fill(
   with contextlib.closing(work.ordered(make, _jobs(left), workers)) as results:
     for unit in units:
       wanted = piles if unit is None else {unit: piles[unit]}
-      bar.set_description(unit or "play")
+      bar.set_description_str(unit or "play")
       while not all(pile.is_full for pile in wanted.values()):
         of_unit, attempts = next(results)
         if of_unit != unit:  # begun before it was full

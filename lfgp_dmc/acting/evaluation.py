@@ -43,8 +43,7 @@ def evaluate(
     env_step: goes into the rows, which come task by task.
 
   Raises:
-    LostWorkerError: a process was killed.
-    StopRequestedError: see `signals.poll`, called after each episode.
+    LostWorkerError, StopRequestedError: `workers.ordered`, `signals.poll`.
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
@@ -52,21 +51,18 @@ def evaluate(
     _Player, make_environment, make_actor, seed, env_step
   )
   results = work.ordered(make_player, jobs, workers)
+  bar = progress_bars.bar(
+    results,
+    total=len(jobs),
+    desc="evaluating",
+    unit="episode",
+    show=progress,
+    leave=False,
+  )
   rows: list[EvaluationRow] = []
-  with (
-    progress_bars.bar(
-      total=len(jobs),
-      desc="evaluating",
-      unit="episode",
-      show=progress,
-      leave=False,
-    ) as bar,
-    contextlib.closing(results),
-  ):
-    signals.poll()
-    for row in results:
+  with contextlib.closing(results):
+    for row in bar:
       rows.append(row)
-      bar.update()
       signals.poll()
   return rows
 

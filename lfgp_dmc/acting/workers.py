@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 
 from lfgp_dmc.runs import signals
 
-# Set before a worker imports anything.
-_VARIABLES = {
+ONE_THREAD = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
   "OPENBLAS_NUM_THREADS": "1",
   "OMP_WAIT_POLICY": "PASSIVE",
-  "MUJOCO_GL": "off",
 }
+# Set before a worker imports anything.
+_VARIABLES = {**ONE_THREAD, "MUJOCO_GL": "off"}
 _PATIENCE = 0.5  # s, for processes that are ending
 
 
@@ -31,10 +31,8 @@ class LostWorkerError(RuntimeError):
 
 
 class _Worker(NamedTuple):
-  """A process and our end of its pipe."""
-
   process: Any
-  connection: Any
+  connection: Any  # our end of its pipe
 
 
 def ordered(
@@ -132,7 +130,7 @@ def _end(crew: Sequence[_Worker]) -> None:
 
 
 def _serve(make_state: Callable[[], Callable[[Any], Any]], connection) -> None:
-  """A worker's life; it ends with its parent, or when that hangs up."""
+  """Does jobs until the parent ends or hangs up."""
   threading.Thread(target=_end_with_parent, daemon=True).start()
   state: Any = None
   with contextlib.suppress(EOFError, OSError):
@@ -145,8 +143,6 @@ def _serve(make_state: Callable[[], Callable[[Any], Any]], connection) -> None:
         error.add_note(f"in a worker process:\n{traceback.format_exc()}")
         answer = False, error
       connection.send(answer)
-  if hasattr(state, "close"):
-    state.close()
 
 
 def _end_with_parent() -> None:
@@ -158,18 +154,11 @@ def _end_with_parent() -> None:
 
 @contextlib.contextmanager
 def _variables() -> Iterator[None]:
-  """Sets the variables that spawned processes inherit, then restores ours.
-
-  A worker's initializer would set them too late: unpickling its arguments
-  imports.
-  """
-  before = {name: os.environ.get(name) for name in _VARIABLES}
+  """Sets the variables that spawned processes inherit, then restores ours."""
+  before = dict(os.environ)
   os.environ.update(_VARIABLES)
   try:
     yield
   finally:
-    for name, value in before.items():
-      if value is None:
-        del os.environ[name]
-      else:
-        os.environ[name] = value
+    os.environ.clear()
+    os.environ.update(before)

@@ -59,6 +59,7 @@ class Rounds(abc.ABC, Generic[_Agent]):
       LostWorkerError: in an evaluation; there is a checkpoint.
     """
     schedule, progress = self._schedule, self.progress
+    self._functions = evaluate_fn, checkpoint_fn
     progress.is_complete |= progress.env_step >= schedule.env_steps
     self._bar = progress_bars.bar(
       total=schedule.env_steps,
@@ -72,41 +73,32 @@ class Rounds(abc.ABC, Generic[_Agent]):
       try:
         self._begin()
       except signals.StopRequestedError:
-        logging.warning(
-          "stopped before the first step: nothing is stored, and a resumed run "
-          "starts anew"
-        )
+        logging.warning("stopped before the first step: nothing is stored")
         return progress
       if progress.evaluation_due or stop:
-        due = progress.is_complete
-        self._close_round(evaluate_fn, checkpoint_fn, due, stop)
+        self._close_round(progress.is_complete, stop)
       while not progress.is_complete and not stop:
         before = progress.env_step
         self._round()
         step, final = progress.env_step, progress.is_complete
-        evaluate_every = schedule.evaluate_every
-        progress.evaluation_due = final or passed(before, step, evaluate_every)
+        due = final or passed(before, step, schedule.evaluate_every)
+        progress.evaluation_due = due
         due = final or passed(before, step, schedule.checkpoint_every)
-        self._close_round(evaluate_fn, checkpoint_fn, due, stop)
+        self._close_round(due, stop)
     if progress.evaluation_due:  # left for a resumed run
       progress.is_complete = False
     return progress
 
-  def _close_round(
-    self,
-    evaluate_fn: EvaluateFn | None,
-    checkpoint_fn: CheckpointFn | None,
-    is_due: bool,
-    stop: signals.StopRequest,
-  ) -> None:
-    """Evaluates if that is due; makes a checkpoint if it is due or one stops.
+  def _close_round(self, is_due: bool, stop: signals.StopRequest) -> None:
+    """Evaluates and makes a checkpoint, if due.
 
-    An evaluation that a stop or the loss of a process ends is left to the
-    resumed run.
+    An evaluation that a stop or a lost process ends is left to a resumed run.
     """
+    evaluate_fn, checkpoint_fn = self._functions
     progress, lost = self.progress, None
     try:
       if progress.evaluation_due and evaluate_fn:
+        signals.poll()
         self._evaluate(evaluate_fn)
       progress.evaluation_due = False
     except signals.StopRequestedError:

@@ -10,6 +10,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from absl import logging
 
@@ -25,15 +26,10 @@ class StopRequestedError(Exception):
 class StopRequest:
   """Whether a stop is requested."""
 
-  def __init__(self):
-    self._is_made = False
+  is_made = False
 
   def __bool__(self) -> bool:
-    return self._is_made
-
-  def make(self) -> None:
-    """Requests a stop at the next good moment."""
-    self._is_made = True
+    return self.is_made
 
 
 _current = StopRequest()  # of the innermost `stop_request`
@@ -64,11 +60,9 @@ def stop_request() -> Iterator[StopRequest]:
       signal.Signals(number).name,
       _REPEAT,
     )
-    request.make()
+    request.is_made = True
 
-  before = {}
-  if threading.current_thread() is threading.main_thread():
-    before = _install(_counted(act))
+  before = _install(_counted(act))
   _current, _last = request, -math.inf
   try:
     yield request
@@ -88,17 +82,14 @@ def interrupt_once() -> None:
 
 def ignore() -> None:
   """Ignores signals from now on: nothing is left to interrupt."""
-  for number in _SIGNALS:
-    signal.signal(number, signal.SIG_IGN)
+  _install(signal.SIG_IGN)
 
 
 @contextlib.contextmanager
 def held() -> Iterator[None]:
   """Holds signals back; processes started within never get them."""
   held_back: list[int] = []
-  before = {}
-  if threading.current_thread() is threading.main_thread():
-    before = _install(lambda number, frame: held_back.append(number))
+  before = _install(lambda number, frame: held_back.append(number))
   mask = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)  # inherited
   try:
     yield
@@ -120,8 +111,10 @@ def _counted(act: Callable[[int], None]) -> Callable:
   return handle
 
 
-def _install(handler: Callable) -> dict:
-  """Sets the handler; returns those before."""
+def _install(handler: Any) -> dict:
+  """Sets the handler, in the main thread alone; returns those before."""
+  if threading.current_thread() is not threading.main_thread():
+    return {}
   before = {number: signal.getsignal(number) for number in _SIGNALS}
   if before[signal.SIGHUP] is signal.SIG_IGN:  # nohup
     del before[signal.SIGHUP]

@@ -92,8 +92,8 @@ class SignalsTest(shared.FolderTest, parameterized.TestCase):
       f"--config.environment={fixtures.POINT} --config.main_task=right "
       "--config.agent.batch_size=8 --config.agent.networks.hidden_size=16 "
       "--config.agent.reward.batch_size=8 --config.agent.scheduler.xi=5 "
-      "--config.episode_steps=20 --config.env_steps=200 --config.warm_up=20 "
-      "--config.evaluate_first --config.evaluation_episodes=5000 "
+      "--config.episode_steps=20 --config.env_steps=40 --config.warm_up=20 "
+      "--config.evaluate_first --config.evaluation_episodes=20 "
       "--config.evaluation_workers=2 --config.replay_capacity=200 --run=a"
     )
     running = self._start(line)
@@ -101,4 +101,8 @@ class SignalsTest(shared.FolderTest, parameterized.TestCase):
     for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGTERM):
       os.killpg(running.pid, number)
     self._finish(running, 30)
-    self.assertEqual(len(os.listdir(self.folder / "a" / "checkpoints")), 1)
+    self.assertLen(os.listdir(self.folder / "a" / "checkpoints"), 1)
+    again = "train.py --run=a --resume --config.evaluation_workers=1"
+    done = fixtures.call(again, self.folder)
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertIn("success after 40", done.stdout)

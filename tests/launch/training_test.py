@@ -16,6 +16,7 @@ from tests import fixtures as shared
 from tests.launch import fixtures
 
 _WARM_START = {
+  "env_steps": 60,
   "agent.pretraining.updates": 5,
   "agent.networks.actor_trunk": "own",
 }
@@ -38,7 +39,7 @@ class TrainingTest(fixtures.RunTest):
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
 
-  @parameterized.parameters(1, 9)  # episodes: of the first, of the last one
+  @parameterized.parameters(1, 5)  # episodes: of the first, of the last one
   def test_a_stop_in_an_evaluation_changes_no_number(self, episodes):
     changes = {"evaluate_first": True, **_WARM_START}
     config = self.config(**changes)
@@ -63,10 +64,11 @@ class TrainingTest(fixtures.RunTest):
   def test_a_stop_in_the_warm_start_starts_anew(self):
     config = self.config(**_WARM_START)
     whole, _ = self.train(config, "whole")
+    other = self.config(**_WARM_START, evaluation_workers=2)  # may change
     with mock.patch.object(
       signals, "poll", side_effect=signals.StopRequestedError
     ):
-      path, progress = self.train(config, "stopped")
+      path, progress = self.train(other, "stopped")
     self.assertEqual(progress.update, 0)
     self.assertFalse((path / "checkpoints").exists())
     self.train(config, "stopped", resume=True)
