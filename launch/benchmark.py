@@ -62,6 +62,8 @@ def main() -> None:
   output = pathlib.Path(_OUTPUT.value) if _OUTPUT.value else None
   if output and output.exists():
     raise UserError(f"{output} exists; choose another --output")
+  if output:
+    files.check_writable(output)
   with command.checked_input():
     config = config_flags.resolved()
   rows = []

@@ -13,7 +13,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc.acting import collection
 from lfgp_dmc.acting.attempts import CollectionPlan
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import demonstrations, files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
@@ -142,10 +142,8 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
       f"--output={output} exists; valid: a new folder (datasets are never "
       "written into)"
     )
-  # Better now than after minutes of collecting.
+  files.check_writable(output)  # better now than after minutes of collecting
   output.parent.mkdir(parents=True, exist_ok=True)
-  if not os.access(output.parent, os.W_OK):
-    raise command.UserError(f"--output={output}: cannot write there")
   return output, tasks
 
 

@@ -15,7 +15,7 @@ from absl import flags
 
 import lfgp_dmc
 from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.task_names import CONTROL_RATES
@@ -55,6 +55,9 @@ def main() -> None:
   """Plays, prints the table, and writes the rows."""
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
+  if output is not None:  # better now than after all episodes
+    _known(output)
+    files.check_writable(output)
   rows: list[evaluation_csv.EvaluationRow] = []
   for spec, tasks in _plan():
     rows += evaluation.evaluate(
@@ -112,14 +115,18 @@ def _output() -> pathlib.Path | None:
   return path
 
 
+def _known(path: pathlib.Path) -> list[evaluation_csv.EvaluationRow]:
+  """The rows that the file, an evaluation if it exists, has."""
+  with command.checked_input():
+    return evaluation_csv.read_csv(path) if path.exists() else []
+
+
 def add_rows(
   path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
 ) -> None:
   """Appends the rows that the file, an evaluation if it exists, has not."""
   path.parent.mkdir(parents=True, exist_ok=True)
-  with command.checked_input():
-    known = evaluation_csv.read_csv(path) if path.exists() else []
-  keys = {row[:4] for row in known}  # env_step, task, episode, seed
+  keys = {row[:4] for row in _known(path)}  # env_step, task, episode, seed
   evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
 
 

@@ -6,8 +6,9 @@ from typing import Any
 
 from lfgp_dmc.agents.lfgp import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, command
+from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
 from lfgp_dmc.runs import checkpoints, run_folder
@@ -31,6 +32,7 @@ def train(
     raise UserError(
       f"{path} exists; continue it with --resume, or choose another --run"
     )
+  files.check_writable(path / run_folder.CONFIG_NAME)
   parts = assemble.make_parts(config)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
@@ -39,6 +41,7 @@ def train(
       f"{pairs} pairs"
     )
   with command.checked_input():
+    sizes.check(config, parts, files.existing_parent(path))
     if resume:
       folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
     else:
@@ -47,10 +50,17 @@ def train(
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
       _initialise(config, run.agent, run.replay)
-  except (ValueError, OSError) as error:
+  except BaseException as error:
     if not resume:  # it cannot start: as if it had not been tried
       shutil.rmtree(path)
-    raise UserError(str(error)) from error
+    if isinstance(error, ValueError | OSError):
+      raise UserError(str(error)) from error
+    if sizes.is_too_large(error):
+      raise UserError(
+        f"config.agent.networks.hidden_size, config.agent.batch_size or "
+        f"config.replay_capacity is too large: {str(error).splitlines()[0]}"
+      ) from error
+    raise
   return run.train()
 
 

@@ -12,9 +12,15 @@ STEP_COLUMN = "env_step"
 
 
 def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
-  """Reads columns and rows, as text; a torn last line is left out."""
-  with open(path, newline="", encoding="utf-8") as file:
-    text = file.read()
+  """Reads columns and rows, as text; a torn last line is left out.
+
+  Raises:
+    ValueError: it is no CSV; the message names it.
+  """
+  try:
+    text = pathlib.Path(path).read_bytes().decode()
+  except UnicodeDecodeError as error:
+    raise ValueError(f"{path} is no CSV: {error}") from None
   # A process that is killed while writing leaves a torn last line.
   whole = text[: text.rfind("\n") + 1]
   reader = csv.DictReader(whole.splitlines())
@@ -47,7 +53,10 @@ def append(
   if not path.exists() or not path.stat().st_size:
     write(path, columns, rows)
     return
-  with open(path, "r+", newline="", encoding="utf-8") as file:
+  with (
+    files.naming(path),
+    open(path, "r+", newline="", encoding="utf-8") as file,
+  ):
     found = next(csv.reader(file))
     if found != list(columns):
       raise ValueError(f"{path} has columns {found}; expected {list(columns)}")

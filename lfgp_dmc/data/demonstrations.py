@@ -99,11 +99,15 @@ def write(
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
-  with files.replacing(path) as aside, h5py.File(aside, "w") as file:
-    for name, array in arrays.items():
-      file.create_dataset(name, data=array)
-    for name, value in attributes.items():
-      file.attrs[name] = value
+  with files.replacing(path) as aside:
+    try:
+      with h5py.File(aside, "w") as file:
+        for name, array in arrays.items():
+          file.create_dataset(name, data=array)
+        for name, value in attributes.items():
+          file.attrs[name] = value
+    except RuntimeError as error:  # of a full disk, when it is closed
+      raise OSError(str(error)) from None
 
 
 def read(

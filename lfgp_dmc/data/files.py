@@ -1,9 +1,12 @@
 """Files that are whole or absent: write aside, flush to disk, then rename."""
 
 import contextlib
+import errno
 import json
 import os
 import pathlib
+import shutil
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -17,16 +20,68 @@ def replacing(path: Path) -> Iterator[pathlib.Path]:
   It lies in the same folder, which must exist, and has the same suffix. If the
   block raises (also KeyboardInterrupt) it is removed, and what was under the
   final name stays untouched.
+
+  Raises:
+    OSError: it cannot be written; the message names the file.
   """
   final = pathlib.Path(path)
   aside = final.with_name(f".{final.stem}.{os.getpid()}.partial{final.suffix}")
   try:
-    yield aside
-    flush_to_disk(aside)
-    os.replace(aside, final)
-    flush_to_disk(final.parent)
+    with naming(final):
+      aside.touch()
+      mode = aside.stat().st_mode  # some libraries choose another
+      yield aside
+      aside.chmod(mode)
+      flush_to_disk(aside)
+      os.replace(aside, final)
+      flush_to_disk(final.parent)
   finally:
     aside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+  """Adds the path to an OSError that names none, such as that of a full disk.
+
+  A full disk's also says how much room there is.
+  """
+  try:
+    yield
+  except OSError as error:
+    if error.errno is None and os.fspath(path) not in str(error):
+      raise OSError(f"{path}: {error}") from None
+    if error.errno is not None and error.filename is None:
+      if error.errno == errno.ENOSPC:
+        free = shutil.disk_usage(pathlib.Path(path).parent).free / 1e6
+        error.strerror = f"{error.strerror}, {free:.1f} MB are free"
+      error.filename = os.fspath(path)
+    raise
+
+
+def check_writable(path: Path) -> None:
+  """Raises OSError if a file cannot be written there; makes and alters none.
+
+  Its folder need not exist yet.
+  """
+  path = pathlib.Path(path).absolute()
+  try:
+    if path.exists():
+      open(path, "r+b").close()
+    tempfile.TemporaryFile(dir=existing_parent(path)).close()
+  except OSError as error:
+    raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def existing_parent(path: Path) -> pathlib.Path:
+  """The innermost folder above `path` that exists."""
+  parents = pathlib.Path(path).absolute().parents
+  return next(parent for parent in parents if parent.exists())
+
+
+def own(folder: Path, suffix: str) -> list[pathlib.Path]:
+  """The files of a suffix, sorted; none that other systems or kills left."""
+  found = sorted(pathlib.Path(folder).glob(f"*{suffix}"))
+  return [path for path in found if path.name[0] != "."]
 
 
 def flush_to_disk(path: Path) -> None:

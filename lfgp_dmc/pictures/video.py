@@ -1,5 +1,6 @@
 """Clips, pictures and film strips of frames, each with a JSON sidecar."""
 
+import errno
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,7 +20,7 @@ def write(
   fps: float = 20.0,
   metadata: Mapping[str, Any] | None = None,
 ) -> pathlib.Path:
-  """Writes frames and, beside them, `NAME.json`; returns the path.
+  """Writes frames and, beside them, `sidecar(path)`; returns the path.
 
   Args:
     path: `.mp4`, `.gif`, or `.png` (all frames side by side: a film strip).
@@ -41,16 +42,26 @@ def write(
     if suffix == ".png":
       imageio.imwrite(aside, np.concatenate(frames, axis=1))
     elif suffix == ".gif":
-      imageio.mimwrite(aside, frames, duration=1000 / fps, loop=0)
+      first, *rest = map(Image.fromarray, frames)
+      first.save(
+        aside, save_all=True, append_images=rest, duration=1000 / fps, loop=0
+      )
     else:
       # yuv420p halves the colours' resolution: sides must be even.
       odd = ((0, height % 2), (0, width % 2), (0, 0))
       even: list[Any] = [np.pad(frame, odd, mode="edge") for frame in frames]
       imageio.mimwrite(aside, even, fps=fps, quality=8, macro_block_size=2)
+      _check_whole(aside)
   size = {"frames": len(frames), "fps": fps, "width": width, "height": height}
   facts = {"file": path.name, **size, **(metadata or {})}
-  files.write_json(path.with_suffix(".json"), facts)
+  files.write_json(sidecar(path), facts)
   return path
+
+
+def sidecar(path: files.Path) -> pathlib.Path:
+  """`clip.mp4.json` of `clip.mp4`: no two clips share one, and no other file."""
+  path = pathlib.Path(path)
+  return path.with_name(f"{path.name}.json")
 
 
 def film_strip(frames: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
@@ -96,6 +107,14 @@ def label(
   draw.text((margin, middle), left, white, font, anchor="lm")
   draw.text((image.width - margin, middle), right, white, font, anchor="rm")
   return np.asarray(image)
+
+
+def _check_whole(path: pathlib.Path) -> None:
+  """Raises OSError if a clip ends early: a full disk is not reported."""
+  try:
+    imageio.get_reader(path).close()
+  except (OSError, RuntimeError, IndexError):
+    raise OSError(errno.EIO, "the clip cannot be written whole") from None
 
 
 def _checked(frames: Sequence[np.ndarray]) -> list[Any]:

@@ -8,16 +8,14 @@ flushed to disk and then renamed, so that a kill leaves no half of one.
 import hashlib
 import json
 import pathlib
+import re
 import shutil
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import safetensors
-import safetensors.numpy
 from absl import logging
 
-from lfgp_dmc.data import files
+from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs import pytree
 
 KEPT_LATEST = 3
@@ -27,6 +25,7 @@ _ARRAYS = "arrays.safetensors"
 _STATE = "state.json"
 _MANIFEST = "manifest.json"
 _PARTIAL = ".partial-"
+_NAME = re.compile("[0-9]{9,}")
 
 
 class CheckpointError(ValueError):
@@ -48,7 +47,8 @@ def save(
     run_steps: length of the whole run; None keeps the last three only.
 
   Raises:
-    OSError: it could not be written; the earlier checkpoints are untouched.
+    OSError: it could not be written (the message says where, and for a full
+      disk the room needed); the earlier checkpoints are untouched.
     TypeError: a value that cannot be stored.
   """
   folder = pathlib.Path(folder)
@@ -59,7 +59,8 @@ def save(
   aside = folder / f"{_PARTIAL}{final.name}"
   try:
     aside.mkdir()
-    _write(aside, state)
+    with files.naming(final):
+      _write(aside, state)
     if final.exists():  # of before a fall-back to an older checkpoint
       shutil.rmtree(final)
     aside.rename(final)
@@ -75,13 +76,14 @@ def load(path: files.Path) -> dict[str, Any]:
 
   Raises:
     CheckpointError: a file of it is missing, truncated or altered.
+    PermissionError: a file of it may not be read.
   """
   path = pathlib.Path(path)
   _verify(path)
   try:
-    arrays = safetensors.numpy.load_file(path / _ARRAYS)
+    arrays = array_files.read(path / _ARRAYS)
     return pytree.unpack(arrays, files.read_json(path / _STATE))
-  except (ValueError, KeyError, safetensors.SafetensorError) as error:
+  except (ValueError, KeyError) as error:
     raise CheckpointError(f"{path}: {error}") from None
 
 
@@ -102,19 +104,17 @@ def every(folder: files.Path) -> list[pathlib.Path]:
   folder = pathlib.Path(folder)
   if not folder.is_dir():
     return []
-  found = [path for path in folder.iterdir() if path.name.isdigit()]
+  found = [path for path in folder.iterdir() if _NAME.fullmatch(path.name)]
   return sorted(found, key=lambda path: int(path.name))
 
 
 def _write(aside: pathlib.Path, state: Mapping[str, Any]) -> None:
   arrays, tree = pytree.pack(state)
-  # safetensors writes the memory as it lies: it must lie in C order.
-  ordered = {name: np.asarray(a, order="C") for name, a in arrays.items()}
-  safetensors.numpy.save_file(ordered, aside / _ARRAYS)
+  array_files.write(aside / _ARRAYS, arrays)
   (aside / _STATE).write_text(json.dumps(tree), encoding="utf-8")
   manifest = {name: _fingerprint(aside / name) for name in (_ARRAYS, _STATE)}
   (aside / _MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
-  for name in (_ARRAYS, _STATE, _MANIFEST):
+  for name in (_STATE, _MANIFEST):
     files.flush_to_disk(aside / name)
   files.flush_to_disk(aside)
 
@@ -135,6 +135,8 @@ def _verify(path: pathlib.Path) -> None:
           f"{path / name} has {found['bytes']} bytes that are not the "
           f"{written['bytes']} that were written"
         )
+  except PermissionError:  # it may be as good as any
+    raise
   except (OSError, KeyError, TypeError, ValueError) as error:
     raise CheckpointError(f"{path}: {error}") from None
 

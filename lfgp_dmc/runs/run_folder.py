@@ -8,6 +8,7 @@ import datetime
 import fcntl
 import json
 import pathlib
+import shutil
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -74,8 +75,12 @@ def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
     raise ValueError(
       f"{path} exists; continue it with --resume, or choose another --run"
     ) from None
-  run = RunFolder(path, _locked(path))
-  files.write_json(path / CONFIG_NAME, config)
+  try:
+    run = RunFolder(path, _locked(path))
+    files.write_json(path / CONFIG_NAME, config)
+  except BaseException:
+    shutil.rmtree(path)
+    raise
   return run
 
 
@@ -152,7 +157,8 @@ def _locked(path: pathlib.Path):
   """An open file whose lock the system releases however the process ends."""
   file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
   try:
-    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    with files.naming(file.name):  # some file systems have no locks
+      fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
   except BlockingIOError:
     file.close()
     raise ValueError(

@@ -107,9 +107,9 @@ class StoredTest(FolderTest):
   def test_missing_files_are_named(self):
     _policy().save(self.folder)
     (self.folder / "policy.safetensors").unlink()
-    with self.assertRaisesRegex(FileNotFoundError, "policy.safetensors is mis"):
+    with self.assertRaisesRegex(ValueError, "policy.safetensors is mis"):
       Policy.load(self.folder)
-    with self.assertRaisesRegex(FileNotFoundError, "config.json is missing"):
+    with self.assertRaisesRegex(ValueError, "config.json is missing"):
       Policy.load(self.folder.parent)
 
   def test_damaged_arrays_are_named(self):

@@ -54,11 +54,36 @@ class TrainingTest(fixtures.RunTest):
     ({"device": "abacus"}, "config.device is 'abacus'"),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
     ({"main_task": "up"}, "up.hdf5: missing"),
+    ({"agent.networks.hidden_size": 10**6}, "hidden_size is 1000000: it needs"),
+    ({"agent.networks.hidden_size": 10**12}, "hidden_size is 1000000000000"),
+    ({"agent.batch_size": 10**12}, "config.agent.batch_size is 1000000000000"),
+    ({"replay_capacity": 10**20}, "config.replay_capacity is 1000000000000000"),
     ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
   )
   def test_bad_input_leaves_no_folder(self, changes, message):
     with self.assertRaisesRegex(UserError, message):
       self.train(self.config(**changes))
+    self.assertFalse((self.folder / "runs" / "a").exists())
+
+  @parameterized.parameters(
+    ("lfgp_dmc.launch.assemble.make_agent", MemoryError("9 GB"), UserError),
+    (
+      "lfgp_dmc.launch.assemble.make_agent",
+      KeyboardInterrupt(),
+      KeyboardInterrupt,
+    ),
+    ("lfgp_dmc.launch.assemble.make_agent", KeyError("ours"), KeyError),
+    ("fcntl.flock", OSError(37, "No locks"), OSError),
+    ("lfgp_dmc.runs.run_folder.files.write_json", OSError(28, "full"), OSError),
+  )
+  def test_whatever_happens_before_the_start_no_folder_is_left(
+    self, place, fault, raised
+  ):
+    with (
+      mock.patch(place, side_effect=fault),
+      self.assertRaises(raised),
+    ):
+      self.train(self.config())
     self.assertFalse((self.folder / "runs" / "a").exists())
 
   def test_every_fault_of_a_dataset_is_told(self):
