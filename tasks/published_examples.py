@@ -28,7 +28,7 @@ _ARRAYS = ("observation", "action", "next_observation")
 
 def is_folder_of_examples(folder: files.Path) -> bool:
   """Whether a dataset folder holds such files."""
-  return any(pathlib.Path(folder).glob("*" + SUFFIX))
+  return bool(files.own(folder, SUFFIX))
 
 
 def read_folder(

@@ -236,5 +236,5 @@ def _read_sidecar(folder: pathlib.Path) -> dict[str, Any]:
       **{name: int(found[name]) for name in counts},
       "reward_tasks": list(found.get("reward_tasks", ())),
     }
-  except (AttributeError, KeyError, TypeError, ValueError):
+  except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
     raise ValueError(f"{path} is damaged: {found!r}") from None

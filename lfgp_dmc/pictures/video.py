@@ -59,7 +59,7 @@ def write(
 
 
 def sidecar(path: files.Path) -> pathlib.Path:
-  """`clip.mp4.json` of `clip.mp4`: no two clips share one, and no other file."""
+  """`clip.mp4.json` of `clip.mp4`: the name of no other file."""
   path = pathlib.Path(path)
   return path.with_name(f"{path.name}.json")
 

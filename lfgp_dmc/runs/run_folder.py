@@ -131,7 +131,9 @@ def read_config(path: files.Path) -> dict[str, Any]:
     config = files.read_json(path / CONFIG_NAME)
   except ValueError as error:
     raise ValueError(str(error)) from None
-  if not isinstance(config, dict):
+  if not isinstance(config, dict) or not isinstance(
+    config.get(POLICY_FIELD, {}), dict
+  ):
     raise ValueError(f"{path / CONFIG_NAME} holds no config")
   return config
 
