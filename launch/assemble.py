@@ -16,6 +16,7 @@ from lfgp_dmc.launch import command, datasets, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc.observations import REWARD_PREFIX, SUCCESS_PREFIX
+from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import TrainSchedule
@@ -122,7 +123,7 @@ def make_run(
     replay,
     _schedule(config, progress_bar),
     evaluate,
-    config.to_dict(),
+    run_folder.read_config(folder.path),
     seeding.derive(config.seed, "environment"),
   )
 

@@ -6,26 +6,40 @@ before the flag `config` is defined with them.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from absl import flags
 from ml_collections import config_flags
 
 from lfgp_dmc.launch import configs
+from lfgp_dmc.runs import run_folder
 
 
 def define(
-  arguments: Sequence[str], flag_values: flags.FlagValues = flags.FLAGS
+  arguments: Sequence[str],
+  flag_values: flags.FlagValues = flags.FLAGS,
+  stored: Mapping[str, Any] | None = None,
 ) -> None:
   """Defines `--preset`, and `--config.*` for the algorithm, preset and kinds.
+
+  Their defaults are those of the preset, or the values of a `stored` config.
 
   Raises:
     ValueError: an unknown algorithm or preset.
   """
-  algorithm = _last(arguments, "config.algorithm", "lfgp")
+  values = dict(configs.flattened(stored or {}))
+  algorithm = _last(
+    arguments, "config.algorithm", values.get("algorithm", "lfgp")
+  )
   preset = _last(arguments, "preset", "paper")
   names = [_name(argument).removeprefix("config.") for argument in arguments]
   kinds = {
+    name: str(value)
+    for name, value in values.items()
+    if name.startswith("agent.") and name.endswith(configs.KIND)
+  }
+  kinds |= {
     name: _last(arguments, f"config.{name}", "")
     for name in names
     if name.startswith("agent.") and name.endswith(configs.KIND)
@@ -33,6 +47,8 @@ def define(
   main_task = _last(arguments, "config.main_task", "")
   defaults = configs.make_config(algorithm, preset, main_task, kinds)
   known = dict(configs.flattened(defaults.to_dict()))
+  known |= {name: value for name, value in values.items() if name in known}
+  defaults.update_from_flattened_dict(known)
   for argument, name in zip(arguments, names, strict=True):
     if _name(argument) == f"config.{name}" and name not in known:
       close = configs.hint(name, known, "--config.")
@@ -65,10 +81,23 @@ def resolved(
   return configs.from_dict(flag_values.config.to_dict())
 
 
-def is_given() -> bool:
-  """Whether a preset or any setting was given, in a flagfile or not."""
-  overrides = config_flags.get_override_values(flags.FLAGS["config"])
-  return bool(overrides) or flags.FLAGS["preset"].present > 0
+def stored(arguments: Sequence[str]) -> dict[str, Any] | None:
+  """The config of the run that `--resume` goes on with, if no preset is given.
+
+  Raises:
+    ValueError: there is no such run, or its config is damaged.
+  """
+  names = [_name(argument) for argument in arguments]
+  run = _last(arguments, "run", "")
+  if "resume" not in names or "preset" in names or not run:
+    return None
+  task = _last(arguments, "config.main_task", "stack")
+  run = configs.fill(run, {"main_task": task})
+  found = run_folder.settings(run_folder.read_config(run))
+  try:
+    return configs.from_dict(found).to_dict()
+  except ValueError as error:
+    raise ValueError(f"{run}/{run_folder.CONFIG_NAME}: {error}") from None
 
 
 def _name(argument: str) -> str:

@@ -10,6 +10,7 @@ events, checkpoints/, replay/ and policy.safetensors.
 
 import functools
 import pathlib
+from collections.abc import Sequence
 
 from absl import flags
 
@@ -25,7 +26,8 @@ _RUN = flags.DEFINE_string(
 _RESUME = flags.DEFINE_bool(
   "resume",
   False,
-  "Continue --run from its last good checkpoint, with its own config.",
+  "Continue --run from its last good checkpoint, with its own config; flags "
+  "may name more steps, or where its demonstrations are now.",
 )
 
 
@@ -62,22 +64,18 @@ def report(
 
 
 def _config() -> configs.RunConfig:
-  """The config of the flags, or on a bare --resume the run's own."""
+  """The config of the flags, which --resume lays over the run's own."""
+  if _RESUME.value and not _RUN.value:
+    raise UserError("--resume needs --run: the folder to continue")
   with command.checked_input():
-    if not _RESUME.value:
-      return config_flags.resolved()
-    if not _RUN.value:
-      raise UserError("--resume needs --run: the folder to continue")
-    if config_flags.is_given():
-      return config_flags.resolved()
-    stored = run_folder.read_config(_RUN.value)
-    try:
-      return configs.from_dict(run_folder.settings(stored))
-    except ValueError as error:
-      raise UserError(f"{_RUN.value}/config.json: {error}") from None
+    return config_flags.resolved()
 
 
-cli = functools.partial(command.run, main, define_flags=config_flags.define)
+def _define_flags(arguments: Sequence[str]) -> None:
+  config_flags.define(arguments, stored=config_flags.stored(arguments))
+
+
+cli = functools.partial(command.run, main, define_flags=_define_flags)
 
 if __name__ == "__main__":
   cli()

@@ -1,12 +1,16 @@
 """Trains by a config, in a run's folder: new, or continued."""
 
+import hashlib
 import pathlib
 import shutil
 from typing import Any
 
+import numpy as np
+
 from lfgp_dmc.agents.lfgp import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
@@ -40,12 +44,15 @@ def train(
       f"demonstrations: {config.demonstrations}, {len(found)} tasks, "
       f"{pairs} pairs"
     )
+  stored = config.to_dict()
+  if found:
+    stored[run_folder.DATA_FIELD] = _fingerprint(found)
   with command.checked_input():
     sizes.check(config, parts, files.existing_parent(path))
     if resume:
-      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
+      folder = run_folder.resume(path, stored, _with_newer_fields)
     else:
-      folder = run_folder.create(path, config.to_dict())
+      folder = run_folder.create(path, stored)
   try:
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
@@ -62,6 +69,16 @@ def train(
       ) from error
     raise
   return run.train()
+
+
+def _fingerprint(found: dict[str, Demonstrations]) -> str:
+  """SHA-256 of all arrays, wherever they lie."""
+  digest = hashlib.sha256()
+  for task, data in found.items():
+    for name, array in data.arrays().items():
+      digest.update(f"{task} {name} {array.shape}".encode())
+      digest.update(np.ascontiguousarray(array).data)
+  return digest.hexdigest()
 
 
 def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:

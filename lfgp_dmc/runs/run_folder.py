@@ -20,6 +20,10 @@ ARRAYS_NAME = "policy.safetensors"
 # Added to the config by the run: the options of the policy's arrays, so that
 # its folder is a policy folder too.
 POLICY_FIELD = "policy"
+# The fingerprint of the demonstrations, which may move but not change.
+DATA_FIELD = "demonstrations_sha256"
+# What may be another one when a run is resumed; the length only a larger one.
+_MOVABLE = ("demonstrations", "env_steps", "evaluation_workers")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,7 +97,8 @@ def resume(
 
   Args:
     path: of the run.
-    config: of the command; it must equal the run's own.
+    config: of the command; it must equal the run's own, except for more
+      steps, other workers and another place of the same demonstrations.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
@@ -101,19 +106,28 @@ def resume(
       the fields), or another process is running it.
   """
   path = pathlib.Path(path)
-  known = complete(settings(read_config(path)))
+  stored = read_config(path)
+  known = complete(settings(stored))
   fields = _differing_fields(known, settings(config))
+  if stored.get(DATA_FIELD, "") not in ("", config.get(DATA_FIELD, "")):
+    raise ValueError(
+      f"{path} was started with other demonstrations than those that "
+      f"{config.get('demonstrations')} holds now"
+    )
   if fields:
     raise ValueError(
       f"{path} was started with another config; --resume keeps it. Differing: "
       + "; ".join(fields)
     )
-  return RunFolder(path, _locked(path))
+  run = RunFolder(path, _locked(path))
+  files.write_json(path / CONFIG_NAME, {**stored, **config})
+  return run
 
 
 def settings(config: Mapping[str, Any]) -> dict[str, Any]:
   """A run's config without the fields that the run added."""
-  return {k: v for k, v in config.items() if k != POLICY_FIELD}
+  added = (POLICY_FIELD, DATA_FIELD)
+  return {k: v for k, v in config.items() if k not in added}
 
 
 def read_config(path: files.Path) -> dict[str, Any]:
@@ -152,6 +166,10 @@ def _differing_fields(
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names
     if first.get(name) != second.get(name)
+    and (
+      name not in _MOVABLE
+      or (name == "env_steps" and given[name] < known.get(name, 0))
+    )
   ]
 
 

@@ -1,5 +1,6 @@
 """A run from its config to its files, continued, and refused."""
 
+import shutil
 from unittest import mock
 
 import numpy as np
@@ -38,6 +39,35 @@ class TrainingTest(fixtures.RunTest):
       UserError, r"seed \(0, now 4\); agent.scheduler.xi \(5, now 10\)"
     ):
       self.train(self.config(**changed), resume=True)
+
+  def test_resumes_further_with_data_that_moved(self):
+    whole, _ = self.train(self.config(env_steps=200), "whole")
+    run, _ = self.train(self.config(env_steps=100, replay_capacity=200))
+    self.dataset.rename(self.folder / "moved")
+    line = "train.py --run=runs/a --resume"
+    done = fixtures.call(line, self.folder)
+    self.assertRegex(done.stderr, r"\Aerror: no dataset folder .*data")
+    line += " --config.env_steps=200 --config.demonstrations=moved"
+    done = fixtures.call(line, self.folder)
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertEqual(fixtures.numbers(run), fixtures.numbers(whole))
+    stored = run_folder.read_config(run)
+    self.assertEqual((stored["env_steps"], stored["demonstrations"]),
+                     (200, "moved"))  # fmt: skip
+    done = fixtures.call(f"{line} --config.env_steps=100", self.folder)
+    self.assertRegex(done.stderr, r"Differing: env_steps \(200, now 100\)")
+
+  def test_a_ring_that_had_no_slack_resumes_further(self):
+    self.train(self.config(env_steps=40, replay_capacity=60))
+    config = self.config(env_steps=120, replay_capacity=60)
+    self.assertTrue(self.train(config, resume=True)[1].is_complete)
+
+  def test_other_demonstrations_are_not_resumed(self):
+    self.train(self.config(env_steps=40))
+    shutil.rmtree(self.dataset)
+    fixtures.write_dataset(self.dataset, pairs=61)
+    with self.assertRaisesRegex(UserError, "started with other demonstrations"):
+      self.train(self.config(env_steps=40), resume=True)
 
   def test_an_existing_folder_is_refused(self):
     run = self.folder / "runs" / "a"

@@ -92,6 +92,14 @@ class StudyTest(FolderTest):
     with self.assertRaisesRegex(ValueError, "both lfgp on stack with seed 0"):
       self._read()
 
+  def test_a_config_of_odd_types_is_named(self):
+    self._write("lfgp", "stack", 0, {0: 0}, demonstrations=[1])
+    self.assertLen(self._read(), 1)
+    for seed in ("a", None, [1]):
+      self._write("lfgp", "stack", seed, {0: 0})
+      with self.assertRaisesRegex(ValueError, "config.json: seed is"):
+        self._read()
+
   def test_a_run_without_evaluation_is_noted(self):
     self._write("lfgp", "stack", 0, {})
     runs, notes = run_results.read_runs([self.folder / "lfgp_*"])
