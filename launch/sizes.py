@@ -2,7 +2,6 @@
 
 import os
 import shutil
-from collections.abc import Iterator
 
 import torch
 
@@ -11,49 +10,34 @@ from lfgp_dmc.launch.assemble import Parts
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig
 
-_FLOAT = 4  # bytes
-_COPIES = 4  # of a parameter: itself, its gradient, and two moments
-
 
 def check(config: RunConfig, parts: Parts, folder: files.Path) -> None:
-  """Compares what arrays need at the very least with what there is.
+  """Raises UserError if arrays cannot fit; names field, need and room.
 
-  Args:
-    config: of the run.
-    parts: of the run.
-    folder: an existing one, of the disk that the replay goes to.
-
-  Raises:
-    UserError: they do not fit; names the field, the need and the room.
+  The needs are lower bounds: of a parameter there are itself, its gradient and
+  two moments. The replay goes to the disk of `folder`.
   """
-  for field, value, need, room in _needs(config, parts, folder):
-    if need > room:
+  memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+  if parts.device.type == "cuda":
+    memory = torch.cuda.mem_get_info(parts.device)[1]
+  row = 2 * parts.widths[0] + parts.widths[1]
+  hidden, batch = config.agent.networks.hidden_size, config.agent.batch_size
+  for field, value, floats, room in (
+    ("agent.networks.hidden_size", hidden, 4 * hidden**2, memory),
+    ("agent.batch_size", batch, batch * (row + hidden), memory),
+    ("replay_capacity", config.replay_capacity, config.replay_capacity * row,
+     shutil.disk_usage(folder).total),
+  ):  # fmt: skip
+    if 4 * floats > room:
       raise UserError(
-        f"config.{field} is {value}: it needs {need / 1e9:,.0f} GB at least; "
-        f"there are {room / 1e9:,.1f} GB"
+        f"config.{field} is {value}: it needs {4 * floats / 1e9:,.0f} GB at "
+        f"least; there are {room / 1e9:,.1f} GB"
       )
 
 
 def is_too_large(error: BaseException) -> bool:
   """Whether memory ran out, or a size overflowed."""
-  text = str(error)
   of_torch = isinstance(error, RuntimeError) and (
-    "allocate" in text or "overflow" in text
+    "allocate" in str(error) or "overflow" in str(error)
   )
   return of_torch or isinstance(error, MemoryError | OverflowError)
-
-
-def _needs(config, parts, folder) -> Iterator[tuple[str, int, int, int]]:
-  """Field, its value, bytes that it needs, bytes that there are."""
-  memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-  if parts.device.type == "cuda":
-    memory = torch.cuda.mem_get_info(parts.device)[1]
-  agent, tasks = config.agent, len(parts.tasks)
-  hidden = agent.networks.hidden_size
-  weights = _COPIES * tasks * hidden**2
-  yield "agent.networks.hidden_size", hidden, _FLOAT * weights, memory
-  row = 2 * parts.widths[0] + parts.widths[1]
-  batch = agent.batch_size
-  yield "agent.batch_size", batch, _FLOAT * batch * (row + hidden), memory
-  capacity, disk = config.replay_capacity, shutil.disk_usage(folder).total
-  yield "replay_capacity", capacity, _FLOAT * capacity * row, disk

@@ -10,6 +10,7 @@ _BAD = (
   ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
   ("train.py --flagfile=no.flags", "no.flags"),
   ("train.py --config.seed=many", "flag --config.seed=many"),
+  ("train.py --config.threads=9999999", "config.threads is 9999999; valid:"),
   ("train.py --resume", "--resume needs --run"),
   ("train.py --resume --run=no/run", "no run folder no/run"),
   ("evaluate.py stack", "unexpected argument 'stack'"),

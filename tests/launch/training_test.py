@@ -87,6 +87,7 @@ class TrainingTest(fixtures.RunTest):
     ({"agent.networks.hidden_size": 10**6}, "hidden_size is 1000000: it needs"),
     ({"agent.networks.hidden_size": 10**12}, "hidden_size is 1000000000000"),
     ({"agent.batch_size": 10**12}, "config.agent.batch_size is 1000000000000"),
+    ({"replay_capacity": 60, "checkpoint_every": 10**20}, "replay_capacity"),
     ({"replay_capacity": 10**20}, "config.replay_capacity is 1000000000000000"),
     ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
   )
