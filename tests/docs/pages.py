@@ -1,0 +1,26 @@
+"""The code of the pages, to be run by tests."""
+
+import pathlib
+import re
+from typing import Any
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def blocks(page: str, language: str) -> list[str]:
+  """The page's blocks of code in that language, in order."""
+  text = (ROOT / "docs" / page).read_text()
+  return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def commands(page: str) -> list[str]:
+  """The page's commands, without `python launch/`; one a line."""
+  lines = "".join(blocks(page, "sh")).replace("\\\n", " ").splitlines()
+  return [line.removeprefix("python launch/") for line in lines]
+
+
+def run(page: str, **names: Any) -> dict[str, Any]:
+  """Runs all blocks of Python; returns the names that they define."""
+  for code in blocks(page, "python"):
+    exec(compile(code, page, "exec"), names)
+  return names
