@@ -8,15 +8,16 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 def blocks(page: str, language: str) -> list[str]:
-  """The page's blocks of code in that language, in order."""
+  """The page's blocks of code in that language ("": none), in order."""
   text = (ROOT / "docs" / page).read_text()
-  return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+  found = re.findall(r"^```(.*)\n((?:.*\n)*?)```", text, re.MULTILINE)
+  return [code for name, code in found if name == language]
 
 
 def commands(page: str) -> list[str]:
   """The page's commands, without `python launch/`; one a line."""
   lines = "".join(blocks(page, "sh")).replace("\\\n", " ").splitlines()
-  return [line.removeprefix("python launch/") for line in lines]
+  return [line.replace("python launch/", "") for line in lines]
 
 
 def run(page: str, **names: Any) -> dict[str, Any]:
