@@ -36,7 +36,6 @@ class IntentionCloner:
     loss: str,
     dtype: torch.dtype,
   ):
-    """Makes the optimiser of heads and, if the network owns it, trunk."""
     self._network = network
     self._parameters = network.trained_parameters()
     self._optimiser = make_optimiser(

@@ -56,7 +56,7 @@ def _pooled(
 
 
 class ExpertPool:
-  """The rows of all tasks, concatenated."""
+  """The rows of all tasks, concatenated, on the standardiser's device."""
 
   def __init__(
     self,
@@ -64,17 +64,17 @@ class ExpertPool:
     tasks: Sequence[str],
     standardiser: Standardiser,
   ):
-    """Copies the demonstrations to the standardiser's device.
+    """Copies the demonstrations.
 
     Raises:
       ValueError: a task has no demonstrations.
     """
     observation = _pooled(demonstrations, tasks)
     parts = [demonstrations[task] for task in tasks]
-    device = standardiser.mean.device
+    self._device = standardiser.mean.device
 
     def put(array: np.ndarray) -> torch.Tensor:
-      return torch.from_numpy(np.asarray(array, np.float32)).to(device)
+      return torch.from_numpy(np.asarray(array, np.float32)).to(self._device)
 
     self._observation = put(observation)
     self._action = put(np.concatenate([part.action for part in parts]))
@@ -82,111 +82,88 @@ class ExpertPool:
       np.concatenate([part.next_observation for part in parts])
     )
     self._standardiser = standardiser
-    self._device = device
     self._tasks = tuple(tasks)
-    self._sizes = np.array([len(part.action) for part in parts])
-    self._offsets = _offsets(self._sizes)
-    last = np.concatenate([part.is_last for part in parts])
-    self._finals = np.flatnonzero(last)
-    self._final_sizes = np.array([int(part.is_last.sum()) for part in parts])
-    self._final_offsets = _offsets(self._final_sizes)
+    last = [part.is_last for part in parts]
+    self._all = _Rows([np.ones_like(part) for part in last])
+    self._finals = _Rows(last)
     # A task that has nothing but rows of success draws from them throughout.
-    rest = [~p.is_last if not p.is_last.all() else p.is_last for p in parts]
-    self._rest = np.flatnonzero(np.concatenate(rest))
-    self._rest_sizes = np.array([int(part.sum()) for part in rest])
-    self._rest_offsets = _offsets(self._rest_sizes)
+    self._rest = _Rows([part if part.all() else ~part for part in last])
     self.refresh()
 
   def refresh(self) -> None:
     """Standardises all rows anew, after the standardiser has changed."""
     self._inputs = self._standardiser(self._observation)
     self._next_inputs = self._standardiser(self._next_observation)
-    self.next_stds = torch.stack(
-      [
-        self._next_inputs[start : start + size].std(0, correction=0)
-        for start, size in zip(self._offsets, self._sizes, strict=True)
-      ]
-    )
+    parts = self._next_inputs.split(self._all.sizes.tolist())
+    self.next_stds = torch.stack([part.std(0, correction=0) for part in parts])
 
   def check_finals(self) -> None:
     """Raises ValueError naming the tasks without a row of success."""
-    without = [
-      task
-      for task, size in zip(self._tasks, self._final_sizes, strict=True)
-      if not size
-    ]
-    if without:
+    sizes = zip(self._tasks, self._finals.sizes, strict=True)
+    if without := [task for task, size in sizes if not size]:
       raise ValueError(f"no final transitions (is_last) of {without}")
 
   def sample(
     self, generator: np.random.Generator, rows: int, final_rows: int = 0
   ) -> ExpertBatch:
-    """Draws each task's own pairs, uniformly with replacement.
+    """Draws `rows` of each task's own pairs, uniformly with replacement.
 
-    Args:
-      generator: source of the indices.
-      rows: N, pairs a task.
-      final_rows: how many of these come from rows of success; the others
-        then come from the rest of the task's rows, if it has any.
-
-    Returns:
-      [K, N, ...] tensors; rows of success come last.
+    So many of them are rows of success, which come last; the others then come
+    from the rest of the task's rows, if it has any.
     """
-    tasks = len(self._sizes)
+    tasks = np.arange(len(self._tasks))[:, None]
     if not final_rows:
-      index = self._offsets[:, None] + generator.integers(
-        self._sizes[:, None], size=(tasks, rows)
-      )
+      index = self._all.draw(generator, tasks, rows)
     else:
-      rest = self._rest_offsets[:, None] + generator.integers(
-        self._rest_sizes[:, None], size=(tasks, rows - final_rows)
-      )
-      chosen = self._final_offsets[:, None] + generator.integers(
-        self._final_sizes[:, None], size=(tasks, final_rows)
-      )
-      index = np.concatenate([self._rest[rest], self._finals[chosen]], axis=1)
+      rest = self._rest.draw(generator, tasks, rows - final_rows)
+      finals = self._finals.draw(generator, tasks, final_rows)
+      index = np.concatenate([rest, finals], axis=1)
     at = torch.from_numpy(index).to(self._device)
     return ExpertBatch(self._inputs[at], self._action[at])
 
   def sample_transitions(
     self, generator: np.random.Generator, rows: int
   ) -> Batch:
-    """Draws transitions, in equal shares; the rest are the main task's.
-
-    Args:
-      generator: source of the indices.
-      rows: n, transitions in all.
-
-    Returns:
-      [n, ...] tensors.
-    """
-    task = self.split(rows)
-    index = self._offsets[task] + generator.integers(self._sizes[task])
-    at = torch.from_numpy(index).to(self._device)
-    return Batch(self._inputs[at], self._action[at], self._next_inputs[at])
+    """Draws `rows` transitions, of tasks as by `split`."""
+    at = self._all.draw(generator, self.split(rows))
+    index = torch.from_numpy(at).to(self._device)
+    return Batch(
+      self._inputs[index], self._action[index], self._next_inputs[index]
+    )
 
   def sample_finals(
     self, generator: np.random.Generator, task: np.ndarray
   ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Draws what rows of success of `task`, int64 [n], led to.
+    """Draws rows of success of tasks int64 [n].
 
-    Returns:
-      Inputs [n, O], and the actions of the rows, [n, A].
+    The inputs [n, O] that they led to, and their actions [n, A].
     """
-    chosen = self._final_offsets[task] + generator.integers(
-      self._final_sizes[task]
-    )
-    at = torch.from_numpy(self._finals[chosen]).to(self._device)
+    at = torch.from_numpy(self._finals.draw(generator, task)).to(self._device)
     return self._next_inputs[at], self._action[at]
 
   def split(self, rows: int) -> np.ndarray:
     """The task of each of `rows` rows: equal shares, the rest the main's."""
-    tasks = len(self._sizes)
+    tasks = len(self._tasks)
     counts = np.full(tasks, rows // tasks)
     counts[0] += rows % tasks
     return np.repeat(np.arange(tasks), counts)
 
 
-def _offsets(sizes: np.ndarray) -> np.ndarray:
-  """Where each part starts, if parts of these sizes lie end to end."""
-  return np.concatenate([[0], np.cumsum(sizes)[:-1]])
+class _Rows:
+  """Some of each task's rows, where all tasks' lie end to end in the pool."""
+
+  def __init__(self, chosen: Sequence[np.ndarray]):
+    self.sizes = np.array([int(part.sum()) for part in chosen])
+    self._starts = np.cumsum(self.sizes) - self.sizes
+    self._rows = np.flatnonzero(np.concatenate(chosen))
+
+  def draw(
+    self,
+    generator: np.random.Generator,
+    task: np.ndarray,
+    columns: int | None = None,
+  ) -> np.ndarray:
+    """A row of each of tasks [n]; or, for [n, 1], as many as columns."""
+    size = None if columns is None else (len(task), columns)
+    within = generator.integers(self.sizes[task], size=size)
+    return self._rows[self._starts[task] + within]

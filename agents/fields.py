@@ -40,10 +40,7 @@ def faults(
 ) -> list[str]:
   """What is wrong, such as "config.agent.scheduler.xi is 0; valid: ...".
 
-  Args:
-    error: raised by a `checked` class.
-    values: what it was made of.
-    prefix: of all names.
+  Of a `checked` class made of `values`, whose names get the prefix.
   """
   return [_fault(fault, values, prefix) for fault in error.errors()]
 

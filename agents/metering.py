@@ -1,5 +1,6 @@
 """Means of metrics over updates, read from the device only on demand."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -17,7 +18,7 @@ class Meter:
     by_task: Sequence[str],
     device: torch.device | str = "cpu",
   ):
-    """Starts empty; metrics `by_task` are reported as `name/<task>`."""
+    """Metrics `by_task` are reported as `name/<task>`."""
     self._tasks = tuple(tasks)
     size = len(self._tasks)
     self._sums = {name: torch.zeros((), device=device) for name in scalars}
@@ -35,15 +36,10 @@ class Meter:
     means: dict[str, float] = {}
     for name, total in self._sums.items():
       count = self._counts[name]
-      values = total.tolist() if total.dim() else [total.item()]
-      values = [value / count if count else float("nan") for value in values]
-      if total.dim():
-        means |= {
-          f"{name}/{task}": value
-          for task, value in zip(self._tasks, values, strict=True)
-        }
-      else:
-        means[name] = values[0]
+      sums = total.flatten().tolist()
+      values = [value / count if count else math.nan for value in sums]
+      by_task = [f"{name}/{task}" for task in self._tasks]
+      means |= zip(by_task if total.dim() else [name], values, strict=True)
       total.zero_()
       self._counts[name] = 0
     return means

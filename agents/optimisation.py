@@ -33,16 +33,9 @@ def clipped_step(
   parameters: Sequence[nn.Parameter],
   max_norm: float,
 ) -> torch.Tensor:
-  """Makes one step down the gradient, its norm bounded.
+  """Makes one step down the gradient; returns its norm before clipping.
 
-  Args:
-    optimiser: of `parameters`.
-    loss: a scalar.
-    parameters: those whose gradients are measured together.
-    max_norm: bound on their norm; 0: none.
-
-  Returns:
-    The norm before clipping, a scalar.
+  The gradient is that of all parameters together; `max_norm` 0: no bound.
   """
   optimiser.zero_grad()
   loss.backward()

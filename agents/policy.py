@@ -45,17 +45,13 @@ class Policy:
     tasks: Sequence[str],
     deterministic: bool = True,
   ):
-    """Wraps a network; it may go on being trained.
+    """Wraps a network, which may go on being trained.
 
-    Args:
-      network: K heads.
-      tasks: names of the K tasks.
-      deterministic: what `act` does unless told: tanh(mean), or a sample.
+    `deterministic`: whether `act` takes tanh(mean), or a sample, by default.
     """
     self.tasks = tuple(tasks)
     self.deterministic = deterministic
     self._network = network
-    self._indices = {task: index for index, task in enumerate(self.tasks)}
     self._device = network.standardiser.mean.device
     self._task = self.tasks[0]
     self._generator = np.random.default_rng(0)
@@ -64,14 +60,7 @@ class Policy:
   def from_arrays(
     cls, arrays: Mapping[str, np.ndarray], options: Mapping[str, Any]
   ) -> "Policy":
-    """Builds a policy from what `arrays` and `options` of another returned.
-
-    Args:
-      arrays: name -> array.
-      options: the fields of `PolicyOptions`.
-
-    Returns:
-      The policy, on the CPU.
+    """Builds, on the CPU, what another's `arrays` and `options` returned.
 
     Raises:
       ValueError: an option is missing or wrong, or the arrays do not fit;
@@ -131,10 +120,7 @@ class Policy:
   ) -> None:
     """Writes a policy folder, each file whole or not at all.
 
-    Args:
-      folder: made if missing.
-      config: what else `config.json` holds, such as the run's config.
-      env_step: how long it was trained.
+    `config` is what else `config.json` holds, such as the run's config.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -183,17 +169,13 @@ class Policy:
     deterministic: bool | None = None,
     generator: np.random.Generator | None = None,
   ) -> np.ndarray:
-    """Chooses actions.
+    """Chooses actions: raw float32 [O] or [B, O] -> [A] or [B, A] in [-1, 1].
 
     Args:
-      observation: float32 [O] or [B, O], raw.
+      observation: one, or a batch.
       task: whose intention acts; None: the task that `begin` named.
-      deterministic: True: tanh(mean). False: a sample. None: the policy's
-        own setting.
+      deterministic: tanh(mean), or a sample; None: the policy's own setting.
       generator: source of the sample; None: the one that `begin` seeded.
-
-    Returns:
-      float32 [A] or [B, A], within [-1, 1].
 
     Raises:
       ValueError: the policy has no such task.
@@ -216,9 +198,8 @@ class Policy:
     return action if raw.dim() > 1 else action[0]
 
   def _index(self, task: str) -> int:
-    try:
-      return self._indices[task]
-    except KeyError:
+    if task not in self.tasks:
       raise ValueError(
         f"the policy has no task {task!r}; valid: {', '.join(self.tasks)}"
-      ) from None
+      )
+    return self.tasks.index(task)

@@ -19,16 +19,11 @@ def module_state(module: nn.Module) -> dict[str, np.ndarray]:
 def load_module_state(
   module: nn.Module, state: Mapping[str, np.ndarray], what: str
 ) -> None:
-  """Copies named arrays into a module, in place.
-
-  Args:
-    module: where to.
-    state: name -> array, every parameter and buffer.
-    what: the module's name in error messages.
+  """Copies arrays by name into a module, in place.
 
   Raises:
     ValueError: names or shapes differ, or a number is not finite; the
-      message lists each fault.
+      message starts with `what` and lists each fault.
   """
   own = module.state_dict()
   faults = [f"{name} is missing" for name in own if name not in state]
@@ -73,27 +68,3 @@ def load_optimiser_state(
   }
   groups = optimiser.state_dict()["param_groups"]
   optimiser.load_state_dict({"state": moments, "param_groups": groups})
-
-
-def torch_generator_state(generator: torch.Generator) -> np.ndarray:
-  """A torch generator's state, uint8 [...]."""
-  return generator.get_state().cpu().numpy().copy()
-
-
-def load_torch_generator_state(
-  generator: torch.Generator, state: np.ndarray
-) -> None:
-  """Restores what `torch_generator_state` returned."""
-  generator.set_state(torch.from_numpy(np.array(state, dtype=np.uint8)))
-
-
-def numpy_generator_state(generator: np.random.Generator) -> dict[str, Any]:
-  """A NumPy generator's state: JSON-able, with integers up to 128 bits."""
-  return dict(generator.bit_generator.state)
-
-
-def load_numpy_generator_state(
-  generator: np.random.Generator, state: Mapping[str, Any]
-) -> None:
-  """Restores what `numpy_generator_state` returned."""
-  generator.bit_generator.state = dict(state)

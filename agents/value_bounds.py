@@ -18,7 +18,7 @@ class ValueBounds:
   def __init__(
     self, tasks: int, window: int, discount: float, device: torch.device
   ):
-    """Starts without a median; `window`: the updates that it runs over."""
+    """`window`: the updates that medians run over."""
     # The latest last; NaN for updates that have not been made yet.
     self._rows = torch.full((window, 2, tasks), torch.nan, device=device)
     self._horizon = 1.0 / max(1.0 - discount, 1e-8)
@@ -26,14 +26,9 @@ class ValueBounds:
   def __call__(
     self, reward: torch.Tensor, value: torch.Tensor
   ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Takes in a batch.
+    """The least possible value [K, 1] and the greatest, [K, 1] or [K, B].
 
-    Args:
-      reward: [K, B].
-      value: [K, B], the first critics' now, without gradient.
-
-    Returns:
-      The least possible value [K, 1] and the greatest, [K, 1] or [K, B].
+    Takes in a batch: rewards and the first critics' values, [K, B] each.
     """
     low = reward.amin(1).clamp(max=-_LEAST)
     high = reward.amax(1).clamp(min=_LEAST)

@@ -25,10 +25,10 @@ def load(
   show_rewards: bool = False,
   **unknown: object,
 ) -> "PlayEnvironment":
-  """Makes the environment of a task.
+  """Makes the environment of one of the nine tasks, a `composer.Environment`.
 
   Args:
-    task: one of the nine task names.
+    task: its name.
     seed: of the environment's random state; None takes one from the system.
     reward: "sparse" (1 while the task's condition holds, else 0) or "dense"
       (the sum of the task's named terms).
@@ -40,9 +40,6 @@ def load(
     show_rewards: whether every task's dense reward is observed, as
       `reward/<task>`.
     **unknown: refused, with the options that there are.
-
-  Returns:
-    A `composer.Environment`.
 
   Raises:
     ValueError: an unknown name or a value out of range, with the valid ones.

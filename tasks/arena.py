@@ -24,10 +24,9 @@ _LIGHTS = (
 
 
 class PlayArena(composer.Arena):
-  """A table under the tray; the robot's base stands at the origin.
+  """A table, where a block that left the tray comes to rest.
 
-  Attributes:
-    table: its top, where a block that left the tray comes to rest.
+  The robot's base stands at the origin.
   """
 
   def _build(self, name: str = "play") -> None:

@@ -95,11 +95,9 @@ class SetPointControl:
     self._grip_ids = np.asarray(physics.bind(self._grip).element_id)
 
   def reset(self, physics: mjcf.Physics, opening: float) -> None:
-    """Puts the set-point where the TCP is and holds the fingers' opening.
+    """Puts the set-point where the TCP is, once the arm has been placed.
 
-    Args:
-      physics: with the arm already placed and forward kinematics done.
-      opening: 0 closed to 1 open; held until the first gripper command.
+    The fingers' opening, 0..1, is held until the first gripper command.
     """
     tcp = physics.bind(self._panda.tcp).xpos
     set_point = np.clip(tcp, ws.SET_POINT_LOW, ws.SET_POINT_HIGH)

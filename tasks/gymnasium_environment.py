@@ -43,13 +43,10 @@ class BlockEnvironment(DmControlCompatibilityV0):
     render_kwargs: dict[str, Any] | None = None,
     **options: Any,
   ):
-    """Builds the environment.
+    """Builds the environment of a task; options are those of `lfgp_dmc.load`.
 
-    Args:
-      task: one of the nine.
-      render_mode: None, "rgb_array" or "depth_array".
-      render_kwargs: height, width and camera_id of pictures.
-      **options: of `lfgp_dmc.load`.
+    `render_mode` is None, "rgb_array" or "depth_array"; `render_kwargs` are
+    height, width and camera_id of pictures.
     """
     self.task_name, self._is_closed = task, False
     self.metadata = dict(self.metadata)  # shimmy writes into it

@@ -31,12 +31,8 @@ def make(
 ) -> dict[str, observable.Observable]:
   """Makes all observables; those that were not chosen are disabled.
 
-  Args:
-    published: components and flags by name.
-    read_reward: (task, physics) -> its dense reward, float [].
-    arena: has the camera.
-    has_camera: whether the camera is observed in place of privileged parts.
-    show_rewards: whether every goal's dense reward is observed.
+  Components and flags come from `published`, dense rewards from
+  `read_reward(task, physics)`. The camera takes the place of privileged parts.
   """
   made: dict[str, observable.Observable] = {}
 

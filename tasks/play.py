@@ -50,12 +50,9 @@ class PlayTask(composer.Task):
     self.blocks_out = 0
     self.control_timestep = 1.0 / control_hz
     self._published: dict[str, np.ndarray] = {}
+    arena, reward = self.world.arena, self._read_reward
     self._observables = observables.make(
-      self._published,
-      self._read_reward,
-      self.world.arena,
-      has_camera,
-      show_rewards,
+      self._published, reward, arena, has_camera, show_rewards
     )
 
   @property
@@ -88,14 +85,9 @@ class PlayTask(composer.Task):
     """
     request, self.request = self.request, None
     for _ in range(_MOST_ATTEMPTS):
-      initialisers.place_all(
-        physics,
-        random_state,
-        self.world,
-        self._spawn,
-        self._goal.start,
-        request or initialisers.Request(),
-      )
+      wanted = request or initialisers.Request()
+      where = self._spawn, self._goal.start, wanted
+      initialisers.place_all(physics, random_state, self.world, *where)
       if request is None:
         for _ in range(_SETTLE_STEPS):
           physics.step()

@@ -34,10 +34,7 @@ def is_folder_of_examples(folder: files.Path) -> bool:
 def read_folder(
   folder: files.Path, tasks: Sequence[str]
 ) -> dict[str, Demonstrations]:
-  """Reads and converts the files of the tasks.
-
-  Returns:
-    Task -> its rows, each an episode of its own that ends in success.
+  """Reads and converts the files of the tasks; each row ends an episode.
 
   Raises:
     DatasetError: one line a faulty or missing file.

@@ -35,13 +35,10 @@ _TO_COSINES = np.ascontiguousarray(_SYMMETRIES[:, 0].T)  # [4, 24]
 
 
 def reduce_rotation(quat: np.ndarray) -> np.ndarray:
-  """The equivalent rotation of a cube with the smallest angle.
+  """The equivalent rotations of a cube with the smallest angles.
 
-  Args:
-    quat: unit quaternions w x y z, float [..., 4].
-
-  Returns:
-    float [..., 4], w > 0; among ties the cube rotation of the lowest index.
+  Unit quaternions w x y z, float [..., 4], w > 0 in the result; among ties the
+  cube rotation of the lowest index.
   """
   cosines = np.abs(quat @ _TO_COSINES)
   # Rounded, so that the last bit decides no tie.

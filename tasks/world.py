@@ -9,14 +9,9 @@ from lfgp_dmc.tasks.features import FeatureReader
 
 
 class World:
-  """Arena, robot, tray and blocks, with contacts, control and a reader.
+  """Arena, robot, tray, blocks and zones, with contacts, control and a reader.
 
-  Attributes:
-    arena: the root entity.
-    panda, tray, blue, green: the bodies.
-    zones: the coloured zones, by their block's colour.
-    control: turns actions into servo commands.
-    reader: turns the simulator's state into a snapshot and the 59 floats.
+  The arena is the root entity.
   """
 
   def __init__(self):

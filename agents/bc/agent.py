@@ -42,7 +42,6 @@ class BcAgent:
     shuffling: np.random.Generator,
     dtype: torch.dtype,
   ):
-    """Puts the parts together; see `build`."""
     self.tasks = tuple(tasks)
     self._config = config
     self._network = network
@@ -51,11 +50,7 @@ class BcAgent:
     self._best = copy.deepcopy(network).requires_grad_(False)
     self.policy = Policy(self._best, tasks)  # of the best weights so far
     self._cloner = IntentionCloner(
-      network,
-      config.learning_rate,
-      config.optimiser,
-      config.loss,
-      dtype,
+      network, config.learning_rate, config.optimiser, config.loss, dtype
     )
     device = network.standardiser.mean.device
     self._meter = Meter(tasks, (f"loss/{_LOSS}",), (_LOSS,), device)
@@ -129,7 +124,7 @@ class BcAgent:
       "best": serialisation.module_state(self._best),
       "cloner": self._cloner.state_dict(),
       "meter": self._meter.state_dict(),
-      "shuffling": serialisation.numpy_generator_state(self._shuffling),
+      "shuffling": self._shuffling.bit_generator.state,
       "epoch": self._epoch,
       "best_epoch": self._best_epoch,
       "best_loss": np.asarray(self._best_loss),
@@ -142,9 +137,7 @@ class BcAgent:
     serialisation.load_module_state(self._best, state["best"], "best network")
     self._cloner.load_state_dict(state["cloner"])
     self._meter.load_state_dict(state["meter"])
-    serialisation.load_numpy_generator_state(
-      self._shuffling, state["shuffling"]
-    )
+    self._shuffling.bit_generator.state = state["shuffling"]
     self._epoch = int(state["epoch"])
     self._best_epoch = int(state["best_epoch"])
     self._best_loss = float(state["best_loss"])
@@ -184,13 +177,8 @@ def build(
     action_size,
     initial,
   ).to(device)
-  pairs = SplitPairs(
-    demonstrations,
-    tasks,
-    standardiser,
-    config.validation_share,
-    seeding.generator(seed, "split"),
-  )
+  split, share = seeding.generator(seed, "split"), config.validation_share
+  pairs = SplitPairs(demonstrations, tasks, standardiser, share, split)
   shuffling = seeding.generator(seed, "shuffling")
   dtype = torch.bfloat16 if bfloat16 else torch.float32
   return BcAgent(config, tasks, network, pairs, shuffling, dtype)

@@ -56,14 +56,7 @@ class SplitPairs:
     """Draws one epoch: every training row of the largest task once.
 
     What is missing to a whole last batch, or to a smaller task, is filled up
-    from the start of the task's own order.
-
-    Args:
-      generator: source of the order.
-      batch_size: B, pairs a task.
-
-    Returns:
-      Rows for `batch`, int64 [updates, K, B].
+    from the start of the task's own order. The rows are int64 [updates, K, B].
     """
     updates = -(-max(map(len, self.train_rows)) // batch_size)
     order = np.stack(

@@ -8,10 +8,10 @@ import numpy as np
 import tqdm
 
 from lfgp_dmc import seeding
-from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import transfer
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
+from lfgp_dmc.agents.lfgp.config import LfgpConfig
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
@@ -27,6 +27,7 @@ class LfgpAgent:
 
   def __init__(
     self,
+    config: LfgpConfig,
     tasks: Sequence[str],
     learner: LfgpLearner,
     batches: BatchMaker,
@@ -34,11 +35,7 @@ class LfgpAgent:
     pretraining: Pretraining,
     experts: ExpertPool | None,
     seed: int,
-    *,
-    xi: int,
-    discount: float,
   ):
-    """Puts the parts together; see `builder.build`."""
     self.tasks = tuple(tasks)
     self.learner = learner
     self.batches = batches
@@ -47,7 +44,7 @@ class LfgpAgent:
     self._pretraining = pretraining
     self._experts = experts
     self._acting = seeding.generator(seed, "acting")
-    self._xi, self._discount = xi, discount
+    self._xi, self._discount = config.scheduler.xi, config.critic.discount
     device = learner.networks.log_temperature.device
     self._meter = Meter(tasks, SCALAR_METRICS, TASK_METRICS, device)
     self._choices = np.zeros(len(self.tasks), np.int64)
@@ -59,14 +56,13 @@ class LfgpAgent:
   def start_from(self, policy: Policy) -> None:
     """Lets the intentions start as those of a policy, by task name.
 
-    Args:
-      policy: with the same sizes; its trunk and standardisation come along.
+    Its trunk and standardisation come along.
 
     Raises:
       ValueError: it has other sizes, or none of our tasks.
     """
     self._check_common(policy.tasks, "the policy")
-    transfer.carry_heads(
+    transfer.carry(
       self.learner.networks.intentions,
       policy.arrays(),
       self.tasks,
@@ -80,32 +76,43 @@ class LfgpAgent:
     networks: Mapping[str, Mapping[str, np.ndarray]],
     source_tasks: Sequence[str],
     updates: int = 0,
+    main_head: bool = False,
   ) -> None:
     """Takes over what another agent learned (section 5.2 of the paper).
 
-    Temperatures, optimisers and scheduler stay fresh.
+    These are `state_dict()["learner"]["networks"]` of that agent.
+    Temperatures, optimisers and scheduler stay fresh. If a task is new,
+    `prepare` makes so many updates on the replay.
 
     Args:
-      networks: `state_dict()["learner"]["networks"]` of the other agent.
-      source_tasks: its tasks.
-      updates: if a task is new, `prepare` makes so many on the replay.
+      networks: by name.
+      source_tasks: their tasks, the main task first.
+      updates: see above.
+      main_head: the heads of the other main task become those of ours, as the
+        released code has it for Stack -> Unstack-Stack.
 
     Raises:
-      ValueError: its networks have other sizes, or none of our tasks.
+      ValueError: its networks have other sizes, or none of our tasks; or its
+        main task is another task of ours.
     """
     self._check_common(source_tasks, "the other run")
+    is_any_new = bool(set(self.tasks) - set(source_tasks))
+    if main_head:
+      main, *others = source_tasks
+      if main in self.tasks:
+        raise ValueError(
+          f"the other run's main task {main} is a task of this run: its head "
+          "is carried over under its own name"
+        )
+      source_tasks = (self.tasks[0], *others)
     own = self.learner.networks
     transfer.carry_networks(own, networks, self.tasks, source_tasks)
     self._refresh_inputs()
-    if set(self.tasks) - set(source_tasks):
+    if is_any_new:
       self._first_updates = updates
 
   def prepare(self, progress_bar: bool = False) -> None:
-    """Makes the updates that are due before the first step, if any.
-
-    Args:
-      progress_bar: whether to show the updates' rate and time left.
-    """
+    """Makes the updates that are due before the first step, if any."""
     if self._has_started:
       return
     learner = self.learner
@@ -128,19 +135,12 @@ class LfgpAgent:
     self._has_started = True
 
   def begin_episode(self) -> None:
-    """Starts an episode."""
+    """Makes the scheduler choose anew."""
     self._episode_step = 0
     self._scheduler.begin_episode()
 
   def act(self, observation: np.ndarray) -> np.ndarray:
-    """Samples the scheduled intention's action; steps the scheduler.
-
-    Args:
-      observation: float32 [O].
-
-    Returns:
-      float32 [A].
-    """
+    """Samples the scheduled intention's action [A]; steps the scheduler."""
     if self._episode_step % self._xi == 0:
       index = self._scheduler.next_task()
       self._choices[index] += 1
@@ -151,11 +151,7 @@ class LfgpAgent:
     )
 
   def end_episode(self, episode: Episode) -> None:
-    """Lets the scheduler learn from the main task's reward.
-
-    Args:
-      episode: the T steps since `begin_episode`.
-    """
+    """Lets the scheduler learn from the main task's reward."""
     rewards = self.learner.reward.main_rewards(episode)
     returns = period_returns(rewards, self._xi, self._discount)
     self._scheduler.end_episode(returns.tolist())
@@ -187,8 +183,8 @@ class LfgpAgent:
       "scheduler": self._scheduler.state_dict(),
       "meter": self._meter.state_dict(),
       "choices": self._choices.copy(),
-      "acting": serialisation.numpy_generator_state(self._acting),
-      "sampling": serialisation.numpy_generator_state(self.batches.generator),
+      "acting": self._acting.bit_generator.state,
+      "sampling": self.batches.generator.bit_generator.state,
       "has_started": self._has_started,
     }
 
@@ -198,10 +194,8 @@ class LfgpAgent:
     self._scheduler.load_state_dict(state["scheduler"])
     self._meter.load_state_dict(state["meter"])
     self._choices[:] = state["choices"]
-    serialisation.load_numpy_generator_state(self._acting, state["acting"])
-    serialisation.load_numpy_generator_state(
-      self.batches.generator, state["sampling"]
-    )
+    self._acting.bit_generator.state = state["acting"]
+    self.batches.generator.bit_generator.state = state["sampling"]
     self._has_started = bool(state["has_started"])
     self._refresh_inputs()
     self._episode_step = 0

@@ -8,7 +8,7 @@ from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp.config import (
   DiscriminatorReward,
   ExampleReward,
-  RewardConfig,
+  LfgpConfig,
 )
 from lfgp_dmc.agents.lfgp.device_replay import DeviceReplay
 from lfgp_dmc.agents.lfgp.example_reward import example_rows, with_examples
@@ -21,30 +21,19 @@ class BatchMaker:
 
   def __init__(
     self,
-    config: RewardConfig,
-    rows: int,
+    config: LfgpConfig,
     replay: Replay,
     reward_columns: list[int],
     experts: ExpertPool | None,
     standardiser: Standardiser,
     generator: np.random.Generator,
   ):
-    """Keeps the sources.
-
-    Args:
-      config: which rows each reward needs.
-      rows: B.
-      replay: transitions.
-      reward_columns: of its rewards, those of the K tasks; none are used.
-      experts: demonstrations; None: this config uses none.
-      standardiser: raw observations -> network inputs, on the device.
-      generator: source of every index.
+    """Takes `reward_columns` of the replay's rewards, one a task, or none.
 
     Raises:
       ValueError: a task has no row of success where such rows are needed.
     """
-    self._config = config
-    self._rows = rows
+    self._config, self._rows = config.reward, config.batch_size
     self._replay = replay
     self._columns = reward_columns
     self._experts = experts
@@ -54,8 +43,9 @@ class BatchMaker:
     self._mirror = None
     if self._device.type != "cpu":
       self._mirror = DeviceReplay(replay, self._device)
-    if isinstance(config, ExampleReward) or (
-      isinstance(config, DiscriminatorReward) and config.final_share > 0
+    reward = self._config
+    if isinstance(reward, ExampleReward) or (
+      isinstance(reward, DiscriminatorReward) and reward.final_share > 0
     ):
       self._pool.check_finals()
 

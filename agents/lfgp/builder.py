@@ -20,7 +20,7 @@ from lfgp_dmc.agents.lfgp.discriminator_reward import DiscriminatorRewards
 from lfgp_dmc.agents.lfgp.example_reward import ExampleRewards
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, make_networks
+from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, Training, make_networks
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
@@ -43,19 +43,10 @@ def build(
   bfloat16: bool = False,
   cuda_graphs: bool = True,
 ) -> LfgpAgent:
-  """Builds an LfGP agent; same seed and calls, same numbers.
+  """Builds an LfGP agent; all its random numbers follow from the seed.
 
-  Args:
-    config: settings.
-    tasks: names of the K tasks, the main task first.
-    demonstrations: by task; may be empty if the config uses none.
-    replay: transitions, filled by the training loop.
-    seed: every random number of the agent follows from it.
-    device: where to compute.
-    observation_size: O.
-    action_size: A.
-    bfloat16: products in bfloat16; parameters stay float32.
-    cuda_graphs: on a GPU, updates are recorded, then replayed.
+  The replay is filled by the training loop. With `bfloat16`, parameters stay
+  float32; with `cuda_graphs`, a GPU records updates, then replays them.
 
   Raises:
     ValueError: demonstrations, stored rewards or scheduler do not fit.
@@ -76,15 +67,10 @@ def build(
   columns = replay.reward_columns(tasks) if config.keeps_rewards else []
   learner = make_learner(config, networks, noise, dtype, columns, cuda_graphs)
   batches = BatchMaker(
-    config.reward,
-    config.batch_size,
-    replay,
-    columns,
-    experts,
-    standardiser,
-    random("sampling"),
+    config, replay, columns, experts, standardiser, random("sampling")
   )
   return LfgpAgent(
+    config,
     tasks,
     learner,
     batches,
@@ -92,8 +78,6 @@ def build(
     Pretraining(config.pretraining, config.optimiser, config.batch_size, dtype),
     experts,
     seed,
-    xi=config.scheduler.xi,
-    discount=config.critic.discount,
   )
 
 
@@ -105,32 +89,22 @@ def make_learner(
   stored_columns: Sequence[int] = (),
   cuda_graphs: bool = False,
 ) -> LfgpLearner:
-  """Builds what trains the networks.
+  """Builds what trains the networks; noise is from `generator`.
 
-  Args:
-    config: settings.
-    networks: what to train.
-    generator: on the networks' device, source of all noise.
-    dtype: of products.
-    stored_columns: the tasks' places among stored rewards, if those are used.
-    cuda_graphs: on a GPU, updates are recorded, then replayed.
+  `stored_columns` are the tasks' places among stored rewards, if those are
+  used; products are of the dtype.
   """
   is_recorded = cuda_graphs and generator.device.type == "cuda"
   prior = None
   if networks.prior is not None:
     prior = Prior(config.prior, networks.prior, generator.device)
-  reward = _make_reward(config, networks, generator, dtype, stored_columns)
-  critics = CriticLearner(
-    config.critic, config.optimiser, networks, generator, dtype, reward.bounds
-  )
-  intentions = IntentionLearner(
-    config.intention, config.optimiser, networks, prior, generator, dtype
-  )
+  shared = Training(networks, config.optimiser, generator, dtype)
+  reward = _make_reward(config, shared, stored_columns)
   return LfgpLearner(
     networks,
     reward,
-    critics,
-    intentions,
+    CriticLearner(config.critic, shared, reward.bounds),
+    IntentionLearner(config.intention, shared, prior),
     prior,
     generator,
     config.critic.warmup_updates,
@@ -139,20 +113,11 @@ def make_learner(
 
 
 def _make_reward(
-  config: LfgpConfig,
-  networks: LfgpNetworks,
-  generator: torch.Generator,
-  dtype: torch.dtype,
-  stored_columns: Sequence[int],
+  config: LfgpConfig, shared: Training, stored_columns: Sequence[int]
 ) -> RewardSource:
   match config.reward:
     case DiscriminatorReward() as own:
-      decay = config.optimiser.weight_decay
-      return DiscriminatorRewards(own, decay, networks, generator, dtype)
+      return DiscriminatorRewards(own, shared)
     case ExampleReward() as own:
-      intentions = networks.intentions
-      tasks = len(networks.log_temperature)
-      return ExampleRewards(
-        own, config.batch_size, intentions, tasks, generator, dtype
-      )
+      return ExampleRewards(own, config.batch_size, shared)
   return StoredRewards(config.reward, stored_columns[0])

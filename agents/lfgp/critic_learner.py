@@ -2,10 +2,10 @@
 
 import torch
 
-from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import CriticConfig
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.lfgp.networks import Training
 from lfgp_dmc.agents.lfgp.reward_source import LabelledBatch
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.critic import (
   critic_loss,
   soft_bellman_target,
@@ -15,8 +15,6 @@ from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.optimisation import clipped_step, make_optimiser, polyak
 from lfgp_dmc.agents.value_bounds import ValueBounds
 
-Metrics = dict[str, torch.Tensor]
-
 
 class CriticLearner:
   """Trains the critics, trunk and heads, towards their targets."""
@@ -24,24 +22,19 @@ class CriticLearner:
   def __init__(
     self,
     config: CriticConfig,
-    optimiser: OptimiserConfig,
-    networks: LfgpNetworks,
-    generator: torch.Generator,
-    dtype: torch.dtype,
+    shared: Training,
     bounds: type[ValueBounds] = ValueBounds,
   ):
-    """Makes the optimiser; `bounds` are the value penalty's."""
-    parameters = list(networks.critics.parameters())
+    """`bounds` are the value penalty's."""
+    self._networks, optimiser, self._generator, self._dtype = shared
+    parameters = list(self._networks.critics.parameters())
     self.optimiser = make_optimiser(
       parameters, config.learning_rate, optimiser.weight_decay
     )
     self._parameters = parameters
     self._max_gradient_norm = optimiser.max_gradient_norm
     self._config = config
-    self._networks = networks
-    self._generator = generator
-    self._dtype = dtype
-    temperature = networks.log_temperature
+    temperature = self._networks.log_temperature
     self.bounds = bounds(
       len(temperature),
       config.value_penalty_window,

@@ -8,33 +8,23 @@ written in place, never a Python number.
 
 import collections
 from collections.abc import Callable, Hashable
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import torch
 
 from lfgp_dmc.agents.batches import Draw
+from lfgp_dmc.agents.losses import Metrics
 
-Metrics = dict[str, torch.Tensor]
 Update = Callable[[], Metrics]
 
 _WARM_UPS = 3  # updates before a recording, in which libraries initialise
-
-
-class Recorder(Protocol):
-  """Runs and records updates; `CudaRecorder`, or a test's."""
-
-  def warm_up(self, update: Update, /) -> Metrics:
-    """Makes an update as a later recording requires."""
-
-  def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
-    """Records an update without making it: its metrics, and its replay."""
 
 
 class CudaRecorder:
   """Records on the generator's CUDA device."""
 
   def __init__(self, generator: torch.Generator):
-    """Keeps the one source of random numbers; replays continue its stream."""
+    """The generator is the only one of updates; replays go on with it."""
     self._generator = generator
     self._stream = torch.cuda.Stream(generator.device)
 
@@ -48,7 +38,7 @@ class CudaRecorder:
     return metrics
 
   def record(self, update: Update, /) -> tuple[Metrics, Callable[[], None]]:
-    """Records a CUDA graph."""
+    """Records an update without making it: its metrics, and its replay."""
     graph = torch.cuda.CUDAGraph()
     graph.register_generator_state(self._generator)
     with torch.cuda.graph(graph, stream=self._stream):
@@ -65,8 +55,7 @@ class _Recording(NamedTuple):
 class RecordedUpdates:
   """Makes updates by replaying them, with a recording for each kind."""
 
-  def __init__(self, recorder: Recorder):
-    """Starts without recordings."""
+  def __init__(self, recorder: CudaRecorder):
     self._recorder = recorder
     self._seen: collections.Counter[Hashable] = collections.Counter()
     self._recordings: dict[Hashable, _Recording] = {}
@@ -74,16 +63,10 @@ class RecordedUpdates:
   def __call__(
     self, update: Callable[[Draw], Metrics], draw: Draw, phase: Hashable
   ) -> Metrics:
-    """Makes one update.
+    """Makes one update; the next call overwrites its metrics.
 
-    Args:
-      update: what to make; the same function in every call.
-      draw: its argument; the numbers are copied.
-      phase: what else decides which operations an update consists of. Each
-        phase, with each set of shapes, has a recording of its own.
-
-    Returns:
-      The metrics; the next call overwrites them.
+    Each phase, with each set of shapes in the draw, has a recording of its
+    own: they decide which operations `update` consists of.
     """
     key = (phase, *(tensor.shape for tensor in _tensors(draw)))
     recording = self._recordings.get(key)

@@ -16,12 +16,7 @@ class DeviceReplay:
   """A copy of the rows that can be sampled, brought up to date as they grow."""
 
   def __init__(self, replay: Replay, device: torch.device):
-    """Takes memory for all of the capacity, 488 bytes a row at 59 + 4 floats.
-
-    Args:
-      replay: the transitions on the host; the training loop adds to it.
-      device: where to keep them.
-    """
+    """Takes memory for the whole capacity: 488 bytes a row at 59 + 4 floats."""
     self._replay = replay
     observations, actions = replay.widths
     self._columns = [
@@ -31,22 +26,12 @@ class DeviceReplay:
     self._copied = 0  # rows below this number are here
 
   def gather(self, indices: np.ndarray) -> tuple[torch.Tensor, ...]:
-    """Gathers what `replay.gather(indices)` would, on the device.
-
-    Args:
-      indices: int64 [B]; 0 is the oldest row.
-
-    Returns:
-      Observations [B, O], actions [B, A], next observations [B, O].
-    """
+    """What `replay.gather(indices)` returns, gathered on the device."""
     self._catch_up()
     oldest = self._replay.total - len(self._replay)
     rows = torch.from_numpy((indices + oldest) % self._replay.capacity)
     rows = rows.to(self._columns[0].device)
-    observation, action, following = (
-      column.index_select(0, rows) for column in self._columns
-    )
-    return observation, action, following
+    return tuple(column.index_select(0, rows) for column in self._columns)
 
   def _catch_up(self) -> None:
     """Copies what was added, and anew what was withdrawn and replaced."""

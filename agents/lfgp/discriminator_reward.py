@@ -5,8 +5,9 @@ import torch
 
 from lfgp_dmc.agents.batches import Batch, Draw, ExpertBatch
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.lfgp.networks import Training
 from lfgp_dmc.agents.lfgp.reward_source import LabelledBatch, RewardSource
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.discriminator import (
   discriminator_loss,
   gradient_penalty_loss,
@@ -17,34 +18,21 @@ from lfgp_dmc.agents.optimisation import make_optimiser
 from lfgp_dmc.agents.rewards import reward_from_logits
 from lfgp_dmc.types import Episode
 
-Metrics = dict[str, torch.Tensor]
-
 
 class DiscriminatorRewards(RewardSource):
   """The discriminators of all tasks; the main task may have its own network."""
 
-  def __init__(
-    self,
-    config: DiscriminatorReward,
-    weight_decay: float,
-    networks: LfgpNetworks,
-    generator: torch.Generator,
-    dtype: torch.dtype,
-  ):
+  def __init__(self, config: DiscriminatorReward, shared: Training):
     """Makes the optimisers, by the names of the networks."""
-    super().__init__()
-    names = ("main_discriminator", "discriminator")
-    made = {name: getattr(networks, name) for name in names}
-    made = {name: network for name, network in made.items() if network}
     parts = {
-      name: _NetworkLearner(config, weight_decay, network, generator, dtype)
-      for name, network in made.items()
+      name: _NetworkLearner(config, network, shared)
+      for name, network in shared.networks.modules().items()
+      if isinstance(network, Discriminator)
     }
-    self.optimisers |= {name: part.optimiser for name, part in parts.items()}
-    self._parts = list(parts.values())
-    # How many of the K tasks each has, the main task's first.
-    self._sizes = [network.output.out_features for network in made.values()]
-    self._standardiser = networks.intentions.standardiser
+    self.optimisers = {name: part.optimiser for name, part in parts.items()}
+    self._parts = list(parts.values())  # the main task's first
+    self._sizes = [part.tasks for part in self._parts]
+    self._standardiser = shared.networks.intentions.standardiser
 
   def update(self, draw: Draw) -> Metrics:
     """One update of each network, if there are rows for it."""
@@ -98,22 +86,16 @@ class _NetworkLearner:
   """Trains one discriminator network."""
 
   def __init__(
-    self,
-    config: DiscriminatorReward,
-    weight_decay: float,
-    network: Discriminator,
-    generator: torch.Generator,
-    dtype: torch.dtype,
+    self, config: DiscriminatorReward, network: Discriminator, shared: Training
   ):
-    """Makes the optimiser."""
+    _, optimiser, self._generator, self._dtype = shared
     self.optimiser = make_optimiser(
-      list(network.parameters()), config.learning_rate, weight_decay
+      list(network.parameters()), config.learning_rate, optimiser.weight_decay
     )
     self._config = config
     self._network = network
-    self._generator = generator
+    self.tasks = network.output.out_features  # of the K
     self._device = network.output.weight.device
-    self._dtype = dtype
 
   def update(self, policy: Batch, expert: ExpertBatch) -> Metrics:
     """One update, penalty included, on the expert pairs of its own tasks."""

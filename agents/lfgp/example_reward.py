@@ -11,9 +11,9 @@ import torch
 from lfgp_dmc.agents.batches import Batch, joined
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp.config import ExampleReward
+from lfgp_dmc.agents.lfgp.networks import Training
 from lfgp_dmc.agents.lfgp.reward_source import LabelledBatch, RewardSource
 from lfgp_dmc.agents.networks import tanh_gaussian
-from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 from lfgp_dmc.agents.value_bounds import ValueBounds
 from lfgp_dmc.types import Episode
 
@@ -40,23 +40,15 @@ class ExampleRewards(RewardSource):
 
   bounds = ExampleBounds
 
-  def __init__(
-    self,
-    config: ExampleReward,
-    batch_size: int,
-    intentions: IntentionNetwork,
-    tasks: int,
-    generator: torch.Generator,
-    dtype: torch.dtype,
-  ):
-    """Keeps settings and networks; `batch_size` counts examples in."""
-    super().__init__()
+  def __init__(self, config: ExampleReward, batch_size: int, shared: Training):
+    """`batch_size` counts examples in."""
     self._scale = config.scale
     self._policy_rows = batch_size - example_rows(config, batch_size)
-    self._intentions = intentions
-    self._tasks = torch.arange(tasks, device=generator.device)[:, None]
-    self._generator = generator
-    self._dtype = dtype
+    networks, _, self._generator, self._dtype = shared
+    self._intentions = networks.intentions
+    temperature = networks.log_temperature
+    tasks = torch.arange(len(temperature), device=temperature.device)
+    self._tasks = tasks[:, None]
 
   def label(self, batch: Batch) -> LabelledBatch:
     """Gives examples fresh actions, and each row its reward and mask."""
@@ -103,14 +95,7 @@ def with_examples(
   """Adds states of success, in equal shares; the rest is the main task's.
 
   An example stands for staying where it is: its next state is itself, with
-  noise of its own.
-
-  Args:
-    batch: transitions of the replay.
-    pool: of all demonstrations.
-    generator: source of indices and noise.
-    rows: examples in all.
-    noise: std, in the std of the task's own demonstrations.
+  noise of its own, whose std is in those of the task's own demonstrations.
   """
   task = pool.split(rows)
   state, action = pool.sample_finals(generator, task)

@@ -2,16 +2,13 @@
 
 import torch
 
-from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import IntentionConfig
-from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
+from lfgp_dmc.agents.lfgp.networks import Training
 from lfgp_dmc.agents.lfgp.prior import Prior
-from lfgp_dmc.agents.losses.intention import intention_loss
-from lfgp_dmc.agents.losses.temperature import temperature_loss
+from lfgp_dmc.agents.losses import Metrics
+from lfgp_dmc.agents.losses.intention import intention_loss, temperature_loss
 from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.optimisation import clipped_step, frozen, make_optimiser
-
-Metrics = dict[str, torch.Tensor]
 
 _SATURATED = 0.99
 
@@ -20,29 +17,20 @@ class IntentionLearner:
   """Trains intentions and temperatures by the critics' values."""
 
   def __init__(
-    self,
-    config: IntentionConfig,
-    optimiser: OptimiserConfig,
-    networks: LfgpNetworks,
-    prior: Prior | None,
-    generator: torch.Generator,
-    dtype: torch.dtype,
+    self, config: IntentionConfig, shared: Training, prior: Prior | None
   ):
-    """Makes the optimisers; the prior regularises the loss, if there is one."""
+    self._networks, optimiser, self._generator, self._dtype = shared
     self.target_entropy = config.target_entropy
     self._max_gradient_norm = optimiser.max_gradient_norm
-    self._networks = networks
     self._prior = prior
-    self._generator = generator
-    self._dtype = dtype
-    self._critic_parameters = list(networks.critics.parameters())
-    self._parameters = networks.intentions.trained_parameters()
+    self._critic_parameters = list(self._networks.critics.parameters())
+    self._parameters = self._networks.intentions.trained_parameters()
     self.optimisers = {
       "policy": make_optimiser(
         self._parameters, config.learning_rate, optimiser.weight_decay
       ),
       "temperature": make_optimiser(
-        [networks.log_temperature], config.temperature_learning_rate
+        [self._networks.log_temperature], config.temperature_learning_rate
       ),
     }
 

@@ -10,13 +10,12 @@ import torch
 from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.batches import Draw
 from lfgp_dmc.agents.lfgp.critic_learner import CriticLearner
-from lfgp_dmc.agents.lfgp.cuda_graphs import RecordedUpdates, Recorder
+from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder, RecordedUpdates
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
-
-Metrics = dict[str, torch.Tensor]
+from lfgp_dmc.agents.losses import Metrics
 
 
 class LfgpLearner:
@@ -31,12 +30,9 @@ class LfgpLearner:
     prior: Prior | None,
     generator: torch.Generator,
     warmup_updates: int = 0,
-    recorder: Recorder | None = None,
+    recorder: CudaRecorder | None = None,
   ):
-    """Puts the parts together; see `builder.make_learner`.
-
-    With a recorder, updates are recorded, then replayed.
-    """
+    """With a recorder, updates are recorded, then replayed."""
     self.networks = networks
     self.reward = reward
     self.critics = critics
@@ -55,12 +51,8 @@ class LfgpLearner:
   def update(self, draw: Draw) -> Metrics:
     """One update: discriminators, critics, intentions, temperatures, targets.
 
-    Args:
-      draw: the rows of all parts.
-
-    Returns:
-      Detached tensors by the names in `metric_names.py`; with a recorder, the
-      next update overwrites them.
+    Its metrics have the names in `metric_names.py`; with a recorder, the next
+    update overwrites them.
     """
     trains_intentions = self.updates >= self._warmup_updates
     if self.prior is not None:
@@ -96,7 +88,7 @@ class LfgpLearner:
         name: serialisation.optimiser_state(optimiser)
         for name, optimiser in self._optimisers.items()
       },
-      "generator": serialisation.torch_generator_state(self._generator),
+      "generator": self._generator.get_state().numpy(),
       "bounds": self.critics.bounds.state_dict(),
       "updates": self.updates,
     }
@@ -115,8 +107,6 @@ class LfgpLearner:
       )
     for name, optimiser in self._optimisers.items():
       serialisation.load_optimiser_state(optimiser, state["optimisers"][name])
-    serialisation.load_torch_generator_state(
-      self._generator, state["generator"]
-    )
+    self._generator.set_state(torch.from_numpy(np.array(state["generator"])))
     self.critics.bounds.load_state_dict(state["bounds"])
     self.updates = int(state["updates"])

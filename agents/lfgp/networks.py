@@ -2,12 +2,13 @@
 
 import copy
 import dataclasses
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import torch
 from torch import nn
 
 from lfgp_dmc.agents import fields
+from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, LfgpConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork
@@ -25,23 +26,25 @@ class LfgpNetworks:
   intentions: IntentionNetwork
   critics: CriticNetwork
   target_critics: CriticNetwork  # a copy, trunk and heads, without gradient
-  # Of all tasks, or of all but the main; None: no reward comes from it.
-  discriminator: Discriminator | None
   log_temperature: nn.Parameter  # [K]
-  prior: IntentionNetwork | None = None  # the first intentions, frozen
   main_discriminator: Discriminator | None = None  # the main task's own
+  # Of all tasks, or of all but the main; None: no reward comes from it.
+  discriminator: Discriminator | None = None
+  prior: IntentionNetwork | None = None  # the first intentions, frozen
 
   def modules(self) -> dict[str, nn.Module]:
-    """The modules by the names used in checkpoints."""
-    modules = {
-      "intentions": self.intentions,
-      "critics": self.critics,
-      "target_critics": self.target_critics,
-      "discriminator": self.discriminator,
-      "main_discriminator": self.main_discriminator,
-      "prior": self.prior,
-    }
-    return {name: part for name, part in modules.items() if part is not None}
+    """The modules by name, which checkpoints use."""
+    fields = vars(self).items()
+    return {k: part for k, part in fields if isinstance(part, nn.Module)}
+
+
+class Training(NamedTuple):
+  """What all parts of an update have in common."""
+
+  networks: LfgpNetworks
+  optimiser: OptimiserConfig
+  generator: torch.Generator
+  dtype: torch.dtype
 
 
 def make_networks(
@@ -52,16 +55,7 @@ def make_networks(
   generator: torch.Generator,
   device: torch.device,
 ) -> LfgpNetworks:
-  """Draws all networks.
-
-  Args:
-    config: sizes and options.
-    tasks: K.
-    actions: A.
-    standardiser: raw observation -> input; O is its input size.
-    generator: a CPU generator, source of the initial numbers.
-    device: where to put the networks.
-  """
+  """Draws all networks from a CPU generator."""
   own = config.networks
   sizes = (tasks, own.hidden_size, actions, generator)
   critics = layouts.make_critics(
@@ -71,58 +65,36 @@ def make_networks(
   intentions = layouts.make_intentions(
     own.layout, standardiser, *sizes, trunk
   ).to(device)
-  main_discriminator, discriminator = None, None
-  if isinstance(config.reward, DiscriminatorReward):
-    main_discriminator, discriminator = _make_discriminators(
-      config.reward, *sizes, standardiser, device
-    )
   initial = torch.tensor(config.intention.initial_temperature).log()
-  return LfgpNetworks(
+  networks = LfgpNetworks(
     intentions=intentions,
     critics=critics,
     target_critics=_frozen_copy(critics),
-    discriminator=discriminator,
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
     prior=_frozen_copy(intentions) if config.prior.weight else None,
-    main_discriminator=main_discriminator,
   )
-
-
-def _make_discriminators(
-  config: DiscriminatorReward,
-  tasks: int,
-  hidden: int,
-  actions: int,
-  generator: torch.Generator,
-  standardiser: Standardiser,
-  device: torch.device,
-) -> tuple[Discriminator | None, Discriminator]:
-  """The main task's own, if it has one, and that of all other tasks."""
+  reward = config.reward
+  if not isinstance(reward, DiscriminatorReward):
+    return networks
 
   def make(count: int, masked: str) -> Discriminator:
-    return Discriminator(
-      count,
-      standardiser.input_size,
-      actions,
-      hidden,
-      generator,
-      config.input,
-      masked_inputs(masked, standardiser),
-    ).to(device)
+    sizes = count, standardiser.input_size, actions, own.hidden_size
+    unseen = masked_inputs(masked, standardiser)
+    network = Discriminator(*sizes, generator, reward.input, unseen)
+    return network.to(device)
 
-  if not config.main_masked:
-    return None, make(tasks, config.masked)
-  if tasks == 1:  # there are no others
-    return None, make(1, config.main_masked)
-  return make(1, config.main_masked), make(tasks - 1, config.masked)
+  masked = reward.masked
+  if reward.main_masked and tasks == 1:  # there are no others
+    masked = reward.main_masked
+  elif reward.main_masked:
+    networks.main_discriminator = make(1, reward.main_masked)
+    tasks -= 1
+  networks.discriminator = make(tasks, masked)
+  return networks
 
 
 def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
-  """Which network inputs stand for some floats of the observation.
-
-  Args:
-    slices: of the observation, such as "3:6,53:59".
-    standardiser: what makes inputs of it, at one scale or two.
+  """Which network inputs stand for slices of an observation, as "3:6,53:59".
 
   Raises:
     ValueError: the observation has fewer floats.

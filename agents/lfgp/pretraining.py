@@ -1,5 +1,7 @@
 """Behaviour cloning before the first step."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import torch
 import tqdm
@@ -13,21 +15,14 @@ from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 _LOG_EVERY = 1000  # updates between readings of the loss
 
 
+@dataclass
 class Pretraining:
   """Trains the intentions on their experts' pairs alone."""
 
-  def __init__(
-    self,
-    config: PretrainingConfig,
-    optimiser: OptimiserConfig,
-    batch_size: int,
-    dtype: torch.dtype,
-  ):
-    """Keeps the settings; `batch_size` counts pairs a task."""
-    self._config = config
-    self._optimiser = optimiser
-    self._batch_size = batch_size
-    self._dtype = dtype
+  config: PretrainingConfig
+  optimiser: OptimiserConfig
+  batch_size: int  # pairs a task
+  dtype: torch.dtype
 
   def __call__(
     self,
@@ -36,24 +31,13 @@ class Pretraining:
     generator: np.random.Generator,
     progress_bar: bool = False,
   ) -> None:
-    """Makes all updates, if there are any to make.
-
-    Args:
-      intentions: what to train, with a trunk of their own.
-      experts: all tasks' demonstrations; None only without updates.
-      generator: source of the batches.
-      progress_bar: whether to show the updates' rate and time left.
-    """
-    config = self._config
+    """Makes all updates, if there are any; the trunk is the intentions' own."""
+    config = self.config
     if not config.updates:
       return
     assert experts is not None, "pretraining needs demonstrations"
     cloner = IntentionCloner(
-      intentions,
-      config.learning_rate,
-      self._optimiser,
-      config.loss,
-      self._dtype,
+      intentions, config.learning_rate, self.optimiser, config.loss, self.dtype
     )
     cloner.anneal(config.updates)
     updates = tqdm.trange(
@@ -64,7 +48,7 @@ class Pretraining:
       disable=not progress_bar,
     )
     for update in updates:
-      metrics = cloner.update(experts.sample(generator, self._batch_size))
+      metrics = cloner.update(experts.sample(generator, self.batch_size))
       if update % _LOG_EVERY == 0:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")

@@ -8,14 +8,13 @@ from absl import logging
 
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp.config import PriorConfig
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.behaviour_cloning import (
   behaviour_cloning_loss,
   divergence_loss,
 )
 from lfgp_dmc.agents.networks import tanh_gaussian
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
-
-Metrics = dict[str, torch.Tensor]
 
 _ENTROPY_ROWS = 1024  # a task
 
@@ -30,7 +29,6 @@ class Prior:
   def __init__(
     self, config: PriorConfig, network: IntentionNetwork, device: torch.device
   ):
-    """Keeps the frozen network."""
     self._config = config
     self._network = network
     self._faded = torch.ones((), device=device)
@@ -53,11 +51,6 @@ class Prior:
 
     Their temperatures would grow without bound, since the divergence holds the
     intentions at the prior's entropy.
-
-    Args:
-      tasks: the K tasks.
-      experts: where each is at home; None: nothing is known of that.
-      target_entropy: nats.
     """
     if experts is None or self._config.distance != "divergence":
       return
@@ -82,16 +75,10 @@ class Prior:
     std: torch.Tensor,
     q: torch.Tensor,
   ) -> tuple[torch.Tensor, Metrics]:
-    """The weighted distance.
+    """The weighted distance, and the unweighted one by task.
 
-    Args:
-      inputs: [B, O], the replay's rows, in the products' dtype.
-      mean: [K, B, A], the intentions' there, before the tanh.
-      std: [K, B, A], likewise.
-      q: [2, K, B], the critics' values there, without gradient.
-
-    Returns:
-      The loss, and the unweighted distance by task.
+    At the replay's inputs [B, O]: the intentions' mean and std [K, B, A] before
+    the tanh, and the critics' values [2, K, B], without gradient.
     """
     with torch.no_grad():
       prior_mean, prior_std = self._network(inputs)
@@ -111,16 +98,7 @@ class Prior:
 def entropies(
   network: IntentionNetwork, inputs: torch.Tensor, generator: torch.Generator
 ) -> torch.Tensor:
-  """Estimates each intention's entropy on its own task's rows.
-
-  Args:
-    network: the intentions.
-    inputs: [K, N, O], rows of each task's own.
-    generator: source of the samples.
-
-  Returns:
-    [K], mean -log pi, in nats.
-  """
+  """Each intention's mean -log pi, [K], on its own task's rows [K, N, O]."""
   mean, std = network(inputs)
   _, log_prob = tanh_gaussian.draw(mean, std, generator)
   return -log_prob.mean(-1)

@@ -1,15 +1,16 @@
 """Where rewards come from: the interface of each source."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
 import torch
 
 from lfgp_dmc.agents.batches import Batch, Draw
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.value_bounds import ValueBounds
 from lfgp_dmc.types import Episode
-
-Metrics = dict[str, torch.Tensor]
 
 
 class LabelledBatch(NamedTuple):
@@ -30,9 +31,8 @@ class RewardSource:
   # The kind of bounds on values that follows from its rewards.
   bounds: type[ValueBounds] = ValueBounds
 
-  def __init__(self):
-    """Starts without optimisers, by the names used in checkpoints."""
-    self.optimisers: dict[str, torch.optim.Optimizer] = {}
+  # By the names used in checkpoints.
+  optimisers: Mapping[str, torch.optim.Optimizer] = MappingProxyType({})
 
   def update(self, draw: Draw) -> Metrics:
     """Trains the source, where there is something to train; its metrics."""

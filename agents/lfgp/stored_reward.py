@@ -14,14 +14,13 @@ class StoredRewards(RewardSource):
 
   def __init__(self, config: StoredReward, main_column: int):
     """`main_column`: the main task's place among the stored rewards."""
-    super().__init__()
     self._config, self._main_column = config, main_column
 
   def label(self, batch: Batch) -> LabelledBatch:
     """Clips and scales the stored rewards."""
     assert batch.stored_reward is not None, "the replay keeps rewards"
     reward = bounded(batch.stored_reward, self._config.clip, self._config.scale)
-    return LabelledBatch(batch.inputs, batch.action, batch.next_inputs, reward)
+    return LabelledBatch(*batch[:3], reward)
 
   def main_rewards(self, episode: Episode) -> np.ndarray:
     """As they are stored, float [T]."""

@@ -24,68 +24,43 @@ def carry_networks(
 ) -> None:
   """Carries all networks over; the targets become copies of the critics.
 
-  `source` is `LfgpLearner.state_dict()["networks"]` of the other learner.
-
   Raises:
     ValueError: its networks have other sizes or layouts.
   """
   names = (tasks, source_tasks)
-  carry_heads(networks.intentions, source["intentions"], *names, "intentions")
-  carry_heads(networks.critics, source["critics"], *names, "critics")
-  if networks.discriminator is not None and "discriminator" in source:
+  carry(networks.intentions, source["intentions"], *names, "intentions")
+  carry(networks.critics, source["critics"], *names, "critics")
+  name = "discriminator"
+  if networks.discriminator is not None and name in source:
     # A main task's own discriminator stays with its task.
     ours = tasks[networks.main_discriminator is not None :]
     theirs = source_tasks["main_discriminator" in source :]
-    carry_discriminator(
-      networks.discriminator, source["discriminator"], ours, theirs
-    )
+    carry(networks.discriminator, source[name], ours, theirs, name)
   networks.target_critics.load_state_dict(networks.critics.state_dict())
 
 
-def carry_heads(
+def carry(
   module: nn.Module,
   source: Arrays,
   tasks: Sequence[str],
   source_tasks: Sequence[str],
   what: str,
 ) -> None:
-  """Carries intentions or critics over: all but the heads of other tasks.
+  """Carries a network over: all but the heads or outputs of other tasks.
 
-  Args:
-    module: where to; a task's heads lie on the first axis of `heads.*`, [K] or
-      [2K] with the twin leading.
-    source: `serialisation.module_state` of the same kind of module.
-    tasks: of the module.
-    source_tasks: of the source.
-    what: the module's name in error messages.
+  Heads lie on the first axis of `heads.*`: [K], or [2K], the twin leading; a
+  discriminator's outputs on that of `output.*`.
 
   Raises:
-    ValueError: the networks are of other sizes or layouts.
+    ValueError: the networks are of other sizes or layouts; starts with `what`.
   """
   merged = {**source}
   for name, own in serialisation.module_state(module).items():
-    if name.startswith("heads.") and name in source:
+    if name == "output.bias":
+      merged[name] = own
+    elif name in source and name.startswith(("heads.", "output.")):
       merged[name] = _merged(own, source[name], tasks, source_tasks)
   serialisation.load_module_state(module, merged, what)
-
-
-def carry_discriminator(
-  module: nn.Module,
-  source: Arrays,
-  tasks: Sequence[str],
-  source_tasks: Sequence[str],
-) -> None:
-  """Carries hidden layers and the output weights of common tasks over.
-
-  Raises:
-    ValueError: the networks are of other sizes.
-  """
-  own = serialisation.module_state(module)
-  weight, bias = "output.weight", "output.bias"
-  merged = {**source, bias: own[bias]}
-  if weight in source:
-    merged[weight] = _merged(own[weight], source[weight], tasks, source_tasks)
-  serialisation.load_module_state(module, merged, "discriminator")
 
 
 def _merged(

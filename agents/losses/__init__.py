@@ -2,3 +2,7 @@
 
 Metrics are detached tensors, `[K]` for what differs by task, else scalars.
 """
+
+import torch
+
+Metrics = dict[str, torch.Tensor]

@@ -2,9 +2,8 @@
 
 import torch
 
+from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.networks import tanh_gaussian
-
-Metrics = dict[str, torch.Tensor]
 
 # Of the likelihood: actions nearer to 1 than this have a mean at infinity, and
 # what an expert does the same way each time has a std that goes to 0.
@@ -25,10 +24,7 @@ def behaviour_cloning_loss(
   Args:
     mean: [K, N, A], task k's mean before the tanh, for task k's rows.
     action: [K, N, A], the expert's.
-    weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
-
-  Returns:
-    The weighted sum over tasks, and the unweighted loss by task.
+    weight: [K], a factor a task; None: 1 / K each. By-task metrics have none.
   """
   error = (torch.tanh(mean) - action).square().sum(-1)
   return _over_tasks(error.mean(-1), weight)
@@ -46,9 +42,6 @@ def likelihood_loss(
     mean: [K, N, A], task k's mean before the tanh, for task k's rows.
     std: [K, N, A], likewise; below `LEAST_STD` it counts as that.
     action: [K, N, A], the expert's; clipped to +-`MOST_ACTION`.
-
-  Returns:
-    The mean over tasks, and the loss by task, in nats.
   """
   std = std.clamp(min=LEAST_STD)
   value = torch.atanh(action.clamp(-MOST_ACTION, MOST_ACTION))
@@ -64,23 +57,13 @@ def divergence_loss(
   prior_std: torch.Tensor,
   weight: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
-  """KL(pi || prior), mean over rows, all tasks equal.
+  """KL(pi || prior) in nats, mean over rows, all tasks equal.
 
-  That of two Gaussians, as the tanh of both changes nothing. Where the prior
-  is more precise than `LEAST_STD`, the means' distance counts in units
-  of that, so that the intention can still move; std are compared as
-  they are, down to `LEAST_COMPARED`.
-
-  Args:
-    mean: [K, N, A], before the tanh.
-    std: [K, N, A], likewise.
-    prior_mean: [K, N, A], of what to stay near.
-    prior_std: [K, N, A], likewise.
-    weight: [K], a factor a task; None: 1 / K each, the mean over tasks.
-
-  Returns:
-    The weighted sum over tasks, and the unweighted divergence by task, in
-    nats.
+  That of two Gaussians, as the tanh of both changes nothing; their mean and
+  std are [K, N, A]. Where the prior is more precise than `LEAST_STD`, the
+  means' distance counts in units of that, so that the intention can still
+  move; std are compared as they are, down to `LEAST_COMPARED`. `weight` is as
+  in `behaviour_cloning_loss`.
   """
   ratio = std / prior_std.clamp(min=LEAST_COMPARED)
   shift = (mean - prior_mean) / prior_std.clamp(min=LEAST_STD)

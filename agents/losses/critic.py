@@ -2,7 +2,7 @@
 
 import torch
 
-Metrics = dict[str, torch.Tensor]
+from lfgp_dmc.agents.losses import Metrics
 
 
 def soft_bellman_target(
@@ -24,9 +24,6 @@ def soft_bellman_target(
     next_log_prob: [K, B].
     temperature: [K], alpha.
     discount: gamma.
-
-  Returns:
-    [K, B].
   """
   value = torch.minimum(next_q[0], next_q[1])
   return reward + discount * (value - temperature[:, None] * next_log_prob)
@@ -37,13 +34,12 @@ def critic_loss(
 ) -> tuple[torch.Tensor, Metrics]:
   """Squared soft Bellman residual of both critics, without a half.
 
+  The sum over critics and tasks of the mean over rows.
+
   Args:
     q: [2, K, B].
     target: [K, B], without gradient.
     mask: [K, B], 1 where a task learns from a row, else 0; None: all 1.
-
-  Returns:
-    The sum over critics and tasks of the mean over rows, and values by task.
   """
   loss = masked_mean((q - target).square(), mask).sum()
   value = q.detach()
@@ -72,9 +68,6 @@ def value_penalty_loss(
     high: [K, 1] or [K, B], the greatest.
     weight: the later paper's lambda.
     mask: as in `critic_loss`.
-
-  Returns:
-    The loss, and the mean bounds by task.
   """
   excess = torch.relu(q - high).square() + torch.relu(low - q).square()
   loss = weight * masked_mean(excess, mask).sum()

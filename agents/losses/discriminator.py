@@ -3,7 +3,7 @@
 import torch
 from torch.nn import functional
 
-Metrics = dict[str, torch.Tensor]
+from lfgp_dmc.agents.losses import Metrics
 
 
 def discriminator_loss(
@@ -18,9 +18,6 @@ def discriminator_loss(
   Args:
     policy_logits: [B, K], every task's logit of the replay's rows.
     expert_logits: [N, K], task k's logit of task k's expert rows.
-
-  Returns:
-    The loss, and accuracies and mean logits by task.
   """
   loss = 0.5 * (
     functional.softplus(policy_logits).mean()
@@ -41,15 +38,14 @@ def mix(
 ) -> torch.Tensor:
   """Interpolates replay row i with expert row i of each task.
 
+  share * policy + (1 - share) * expert, [K, N, I]; replay rows are reused in
+  order if N > B.
+
   Args:
     policy: [B, I].
     expert: [K, N, I].
     share: from U(0, 1), [K, N, I], a number for every float (released code;
       Gulrajani et al., 2017, draw one for every row).
-
-  Returns:
-    share * policy + (1 - share) * expert, [K, N, I]; replay rows are reused
-    in order if N > B.
   """
   rows = expert.shape[1]
   if rows > policy.shape[0]:
@@ -60,15 +56,12 @@ def mix(
 def gradient_penalty_loss(
   gradient: torch.Tensor, weight: float = 10.0
 ) -> tuple[torch.Tensor, Metrics]:
-  """Penalty for gradient norms other than 1 (Gulrajani et al., 2017).
+  """Weight * mean (norm - 1)^2 (Gulrajani et al., 2017).
 
   Args:
     gradient: [K, N, I], derivative of the summed logits, or of each task's
       own, by the interpolated (s, a).
     weight: the paper's lambda.
-
-  Returns:
-    weight * mean (norm - 1)^2, and the mean norm.
   """
   norm = torch.linalg.vector_norm(gradient, dim=-1)
   loss = weight * (norm - 1).square().mean()

@@ -24,11 +24,7 @@ class TwinCriticHeads(nn.Module):
     layer_norm: bool = False,
     hidden_layers: int = 1,
   ):
-    """Draws all heads; `features` is the trunk's width, layers are 1 or 2.
-
-    Layer norm (not in the paper), before the last ReLU, has a gain and a bias
-    for each head.
-    """
+    """Layer norm (not in the paper), before the last ReLU, is each head's."""
     super().__init__()
     self.tasks = tasks
     groups, fan_in = 2 * tasks, features + actions
@@ -49,15 +45,10 @@ class TwinCriticHeads(nn.Module):
   def forward(
     self, features: torch.Tensor, action: torch.Tensor
   ) -> torch.Tensor:
-    """Both values of each task for that task's action.
+    """Both values of each task for that task's action, float32 [2, K, B].
 
-    Args:
-      features: [B, features], the same rows in every task; products are
-        computed in their dtype.
-      action: [B, A] for the same action in every task, or [K, B, A].
-
-    Returns:
-      float32 [2, K, B].
+    Features are [B, H], the same rows in every task, and products have their
+    dtype; actions are [B, A], the same in every task, or [K, B, A].
     """
     groups, rows = 2 * self.tasks, features.shape[0]
     dtype = features.dtype
@@ -98,7 +89,6 @@ class CriticNetwork(nn.Module):
   """Trunk and twin heads: the target network is a copy of the whole."""
 
   def __init__(self, trunk: nn.Module, heads: TwinCriticHeads):
-    """Puts the parts together; see `layouts.py`."""
     super().__init__()
     self.trunk = trunk
     self.heads = heads

@@ -11,8 +11,6 @@ from lfgp_dmc.agents.networks.discriminator_passes import (
 )
 from lfgp_dmc.agents.networks.linear import make_linear
 
-INPUTS = ("state_action", "state")
-
 
 class Discriminator(nn.Module):
   """(s, a) -> H tanh -> H tanh -> K logits.
@@ -33,17 +31,7 @@ class Discriminator(nn.Module):
     inputs: str = "state_action",
     masked: Sequence[int] = (),
   ):
-    """Draws all layers.
-
-    Args:
-      tasks: K.
-      observations: O.
-      actions: A.
-      hidden: H, units of each hidden layer.
-      generator: source of the initial numbers.
-      inputs: "state_action" (paper) or "state", without the action.
-      masked: which of the O floats are left out.
-    """
+    """Sees "state_action" (paper) or "state", but the `masked` of O floats."""
     super().__init__()
     self.sees_action = inputs == "state_action"
     seen = torch.tensor(sorted({*range(observations)} - {*masked}))
@@ -62,14 +50,9 @@ class Discriminator(nn.Module):
       return torch.cat([inputs, action], dim=-1)
     return inputs
 
-  def forward(self, pairs: torch.Tensor) -> torch.Tensor:
-    """Maps pairs [..., I] (see `join`) to logits, float32 [..., K]."""
-    hidden = torch.tanh(self.first(pairs))
-    return self.output(torch.tanh(self.second(hidden))).float()
-
   @torch.no_grad()
   def logits(self, pairs: torch.Tensor) -> torch.Tensor:
-    """The same without gradient, and faster."""
+    """Of pairs [..., I] (see `join`), float32 [..., K], without gradient."""
     hidden = tanh_(self.first(pairs))
     return self.output(tanh_(self.second(hidden))).float()
 
@@ -78,15 +61,10 @@ class Discriminator(nn.Module):
   ) -> tuple[torch.Tensor, torch.Tensor]:
     """What both losses need, in one pass; differentiable by the weights alone.
 
-    Args:
-      pairs: [R, I], see `join`; products are computed in their dtype.
-      mixed: [K, N, I], of the same dtype, the rows of each task.
-      per_task: False: the gradient of the sum of all K logits (released code).
-        True: of task k's logit for rows [k].
-
-    Returns:
-      The logits of `pairs`, float32 [R, K], and the derivative of logits of
-      `mixed` by their input, float32 [K, N, I].
+    The logits [R, K] of pairs [R, I], and the derivative of those of mixed
+    pairs [K, N, I] by their input: of the sum of all K (released code), or,
+    `per_task`, of task k's for rows [k]. Float32; products have the dtype of
+    the pairs.
     """
     logits, gradient = DiscriminatorPasses.apply(
       pairs, mixed.flatten(0, 1), per_task, *self.parameters()

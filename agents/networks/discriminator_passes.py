@@ -21,12 +21,8 @@ _ALIGNED = 16  # products with a row length off this waste up to half their time
 def tanh_(value: torch.Tensor) -> torch.Tensor:
   """Tanh as 2 sigmoid(2 x) - 1: a fifth of tanh's time on a CPU.
 
-  Args:
-    value: any shape; a float32 tensor is overwritten.
-
-  Returns:
-    The same shape and dtype; computed in float32, which keeps the digits that
-    the difference would cost bfloat16.
+  In float32, which keeps the digits that the difference would cost bfloat16;
+  a float32 tensor is overwritten.
   """
   wide = value if value.dtype == torch.float32 else value.float()
   return wide.mul_(2).sigmoid_().mul_(2).sub_(1).to(value.dtype)

@@ -9,8 +9,6 @@ from torch.nn import functional
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
-STD_FLOOR = 1e-7  # the paper's epsilon against underflow
-
 
 class IntentionHeads(nn.Module):
   """K heads -> H ReLU (once or twice) -> 2A: mean and raw std."""
@@ -24,7 +22,6 @@ class IntentionHeads(nn.Module):
     generator: torch.Generator,
     hidden_layers: int = 1,
   ):
-    """Draws all heads; `features` is the trunk's width, layers are 1 or 2."""
     super().__init__()
     self.hidden = StackedLinear(tasks, features, hidden, generator)
     self.second = None
@@ -35,18 +32,15 @@ class IntentionHeads(nn.Module):
   def forward(
     self, features: torch.Tensor
   ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Every intention's Gaussian, before the tanh.
+    """Mean and std before the tanh, float32 [K, B, A] each.
 
-    Args:
-      features: [B, H] for the same rows in every task, or [K, B, H].
-
-    Returns:
-      Mean and standard deviation, float32 [K, B, A] each.
+    Features are [B, H], the same rows in every task, or [K, B, H].
     """
     hidden = self.hidden(features).relu_()
     if self.second is not None:
       hidden = self.second(hidden).relu_()
-    return split(self.output(hidden))
+    mean, raw = self.output(hidden).float().chunk(2, dim=-1)
+    return mean, to_std(raw)
 
   def set_std(self, std: float) -> None:
     """Gives all intentions one std, before the tanh, whatever the input."""
@@ -68,14 +62,8 @@ class IntentionHeads(nn.Module):
 
 
 def to_std(raw: torch.Tensor) -> torch.Tensor:
-  """softplus(raw) + 1e-7: a standard deviation, with no other clamp."""
-  return functional.softplus(raw) + STD_FLOOR
-
-
-def split(output: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-  """Splits a head's [..., 2A] into mean and std, float32 [..., A]."""
-  mean, raw = output.float().chunk(2, dim=-1)
-  return mean, to_std(raw)
+  """A standard deviation, with the paper's epsilon against underflow."""
+  return functional.softplus(raw) + 1e-7
 
 
 class IntentionNetwork(nn.Module):
@@ -88,15 +76,7 @@ class IntentionNetwork(nn.Module):
     heads: IntentionHeads,
     owns_trunk: bool,
   ):
-    """Puts the parts together; the trunk may be the critics' own module.
-
-    Args:
-      standardiser: raw observation -> input.
-      trunk: input -> features; see `layouts.py`.
-      heads: features -> Gaussians.
-      owns_trunk: whether losses of the intentions train the trunk. False: it
-        is the critics', and no gradient of ours reaches it.
-    """
+    """Without `owns_trunk`, the trunk is the critics': they alone train it."""
     super().__init__()
     self.standardiser = standardiser
     self.trunk = trunk
@@ -108,13 +88,8 @@ class IntentionNetwork(nn.Module):
     trunk = list(self.trunk.parameters()) if self.owns_trunk else []
     return [*trunk, *self.heads.parameters()]
 
-  def features(self, inputs: torch.Tensor) -> torch.Tensor:
-    """Features [..., H] of standardised inputs [..., O]."""
-    if self.owns_trunk:
-      return self.trunk(inputs)
-    with torch.no_grad():
-      return self.trunk(inputs)
-
   def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Mean and std [K, B, A] for inputs [B, O] or [K, B, O]."""
-    return self.heads(self.features(inputs))
+    with torch.set_grad_enabled(self.owns_trunk and torch.is_grad_enabled()):
+      features = self.trunk(inputs)
+    return self.heads(features)

@@ -25,17 +25,7 @@ def make_intentions(
   generator: torch.Generator,
   critics_trunk: nn.Module | None = None,
 ) -> IntentionNetwork:
-  """Draws K intentions.
-
-  Args:
-    layout: shared_trunk or separate.
-    standardiser: raw observation -> input.
-    tasks: K.
-    hidden: H.
-    actions: A.
-    generator: source of the initial numbers.
-    critics_trunk: the trunk to share; None: one of their own.
-  """
+  """Draws K intentions, with a trunk of their own or the critics'."""
   inputs = standardiser.input_size
   trunk = critics_trunk or _make_trunk(layout, inputs, hidden, generator)
   features, layers = _of_heads(layout, inputs, hidden)
@@ -52,7 +42,7 @@ def make_critics(
   generator: torch.Generator,
   layer_norm: bool = False,
 ) -> CriticNetwork:
-  """Draws 2K critics; arguments as of `make_intentions`."""
+  """Draws 2K critics."""
   trunk = _make_trunk(layout, inputs, hidden, generator)
   features, layers = _of_heads(layout, inputs, hidden)
   heads = TwinCriticHeads(

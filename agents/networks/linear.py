@@ -44,7 +44,6 @@ class StackedLinear(nn.Module):
   def __init__(
     self, groups: int, inputs: int, outputs: int, generator: torch.Generator
   ):
-    """Draws each of G layers as `torch.nn.Linear` with its own fan-in."""
     super().__init__()
     self.weight = nn.Parameter(torch.empty(groups, inputs, outputs))
     self.bias = nn.Parameter(torch.empty(groups, 1, outputs))
@@ -52,13 +51,9 @@ class StackedLinear(nn.Module):
     initialise_(self.bias, inputs, generator)
 
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
-    """Applies layer g to group g.
+    """Applies layer g to group g, in the inputs' dtype.
 
-    Args:
-      inputs: [G, B, I], or [B, I] for the same rows in every group.
-
-    Returns:
-      [G, B, outputs], computed in the inputs' dtype.
+    Maps [G, B, I], or [B, I] for the same rows in every group, to [G, B, O].
     """
     if self.weight.shape[0] == 1:  # a plain product is faster than a batched
       rows = inputs.reshape(-1, inputs.shape[-1])

@@ -17,15 +17,9 @@ def log_one_minus_tanh_squared(value: torch.Tensor) -> torch.Tensor:
 def log_density(
   value: torch.Tensor, std: torch.Tensor, noise: torch.Tensor
 ) -> torch.Tensor:
-  """The log density of the actions tanh(value), summed over A.
+  """The log density [...] of the actions tanh(value) [..., A], in nats.
 
-  Args:
-    value: [..., A], before the tanh.
-    std: [..., A], standard deviation, above 0.
-    noise: [..., A], (value - mean) / std.
-
-  Returns:
-    [...], in nats.
+  `noise` is (value - mean) / std.
   """
   log_prob = (
     -0.5 * noise * noise
@@ -39,16 +33,10 @@ def log_density(
 def sample(
   mean: torch.Tensor, std: torch.Tensor, noise: torch.Tensor
 ) -> tuple[torch.Tensor, torch.Tensor]:
-  """Draws actions by the reparameterisation trick.
+  """Actions tanh(mean + std * noise) [..., A], and their log densities [...].
 
-  Args:
-    mean: [..., A], before the tanh.
-    std: [..., A], standard deviation, above 0.
-    noise: [..., A], from N(0, 1).
-
-  Returns:
-    The actions tanh(mean + std * noise), [..., A] within [-1, 1], and
-    their log densities, [...].
+  The reparameterisation trick; mean and std are before the tanh, the noise is
+  from N(0, 1).
   """
   value = mean + std * noise
   return torch.tanh(value), log_density(value, std, noise)

@@ -23,12 +23,7 @@ class Standardiser(nn.Module):
   deviation: torch.Tensor  # the std, by its name in stored policies
 
   def __init__(self, size: int, tanh_feature_scale: float = 0.0):
-    """Starts as the identity, before any tanh features.
-
-    Args:
-      size: O, floats of an observation.
-      tanh_feature_scale: c, in the observations' own units; 0: none.
-    """
+    """Starts as the identity on O floats; c is in their units, 0: none."""
     super().__init__()
     self.tanh_feature_scale = tanh_feature_scale
     self.register_buffer("mean", torch.zeros(size))
@@ -59,7 +54,6 @@ class Trunk(nn.Module):
   """Two layers with ReLU, O -> H -> H, shared by all tasks."""
 
   def __init__(self, inputs: int, hidden: int, generator: torch.Generator):
-    """Draws both layers."""
     super().__init__()
     self.first = make_linear(inputs, hidden, generator)
     self.second = make_linear(hidden, hidden, generator)

@@ -73,14 +73,10 @@ TABLES: dict[str, dict[str, Row]] = {
 
 
 def table_for(tasks: Sequence[str]) -> np.ndarray:
-  """The published table of a main task.
+  """The published table of a main task, float64 [K + 1, K]; rows sum to 1.
 
-  Args:
-    tasks: names of the K tasks, the main task first.
-
-  Returns:
-    float64 [K + 1, K], rows sum to 1: next task by last task; the last row is
-    for an episode's first choice.
+  A row holds the next tasks by the last one; the last row is for an episode's
+  first choice.
 
   Raises:
     ValueError: there is no table for the main task, or not for all tasks.
@@ -108,10 +104,10 @@ def table_for(tasks: Sequence[str]) -> np.ndarray:
 class ConditionalWeighted(Scheduler):
   """Draws the next task from the row of the last one."""
 
-  def __init__(self, table: np.ndarray, generator: np.random.Generator):
-    """Keeps the table [K + 1, K] of `table_for`."""
+  def __init__(self, tasks: Sequence[str], generator: np.random.Generator):
+    """Raises ValueError as `table_for`."""
     super().__init__(generator)
-    self._table = table
+    self._table = table_for(tasks)
     self._last = -1  # the reset row
 
   def begin_episode(self) -> None:
@@ -123,7 +119,6 @@ class ConditionalWeighted(Scheduler):
     return self._table[self._last]
 
   def next_task(self) -> int:
-    """Chooses a task."""
-    row = self.probabilities()
-    self._last = int(self._generator.choice(len(row), p=row))
+    """Draws a task, whose row comes next."""
+    self._last = super().next_task()
     return self._last

@@ -4,8 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lfgp_dmc.agents.schedulers.base import Scheduler
-from lfgp_dmc.agents.schedulers.weighted_random import WeightedRandom
+from lfgp_dmc.agents.schedulers.config import HandcraftedConfig
+from lfgp_dmc.agents.schedulers.weighted_random import (
+  WeightedRandom,
+  main_weights,
+)
 
 MAIN = "main"  # stands for the main task, whichever it is
 
@@ -27,13 +30,9 @@ INSERT_SEQUENCES: tuple[tuple[str, ...], ...] = (
 
 
 def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
-  """The handcrafted sequences of a task set, as indices.
+  """The handcrafted sequences, of eight indices each.
 
-  Args:
-    tasks: names of the K tasks, the main task first.
-
-  Returns:
-    Sequences of eight indices; two more if `bring` is an auxiliary task.
+  There are two more if `bring` is an auxiliary task.
 
   Raises:
     ValueError: the set lacks a task that the sequences name.
@@ -53,36 +52,33 @@ def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
   return [tuple(names[name] for name in sequence) for sequence in chosen]
 
 
-class WeightedRandomHandcrafted(Scheduler):
+class WeightedRandomHandcrafted(WeightedRandom):
   """At each episode's start: a handcrafted sequence, or weighted random."""
 
   def __init__(
     self,
-    weights: Sequence[float] | np.ndarray,
-    sequences: Sequence[Sequence[int]],
-    probability: float,
+    config: HandcraftedConfig,
+    tasks: Sequence[str],
     generator: np.random.Generator,
   ):
-    """Keeps weights [K] and sequences, which start over in longer episodes."""
-    super().__init__(generator)
-    self._random = WeightedRandom(weights, generator)
-    self._sequences = [tuple(sequence) for sequence in sequences]
-    self._probability = probability
+    """Raises ValueError as `sequences_for`."""
+    super().__init__(main_weights(len(tasks), config.main_weight), generator)
+    self._sequences = sequences_for(tasks)
+    self._probability = config.probability
     self._sequence: tuple[int, ...] = ()
     self._period = 0
 
   def begin_episode(self) -> None:
     """Chooses the sequence of this episode, or none."""
-    self._period = 0
-    self._sequence = ()
+    self._period, self._sequence = 0, ()
     if self._generator.random() < self._probability:
       chosen = int(self._generator.integers(len(self._sequences)))
       self._sequence = self._sequences[chosen]
 
   def next_task(self) -> int:
-    """The sequence's next task, or a random one."""
+    """The sequence's next task, over again in longer episodes; or random."""
     if not self._sequence:
-      return self._random.next_task()
+      return super().next_task()
     task = self._sequence[self._period % len(self._sequence)]
     self._period += 1
     return task

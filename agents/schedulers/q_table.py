@@ -6,30 +6,22 @@ from typing import Any
 import numpy as np
 
 from lfgp_dmc.agents.schedulers.base import Scheduler
+from lfgp_dmc.agents.schedulers.config import QTableConfig
 
 
 class QTable(Scheduler):
   """Boltzmann choice over Q(history, task), learned by moving averages.
 
-  Equation 12 of the paper; its hyper-parameter table gives the defaults.
+  Equation 12 of the paper.
   """
 
   def __init__(
-    self,
-    tasks: int,
-    generator: np.random.Generator,
-    phi: float = 0.6,
-    temperature: float = 360.0,
-    decay: float = 0.9995,
-    minimum: float = 0.1,
+    self, tasks: int, generator: np.random.Generator, config: QTableConfig
   ):
-    """Starts with an empty table; see `config.QTableConfig`."""
+    """Starts with an empty table for K tasks."""
     super().__init__(generator)
-    self._tasks = tasks
-    self._phi = phi
-    self._decay = decay
-    self._minimum = minimum
-    self.temperature = temperature
+    self._tasks, self._config = tasks, config
+    self.temperature = config.temperature
     # History ending in the task chosen -> value; what is missing is 0.
     self._table: dict[tuple[int, ...], float] = {}
     self._history: tuple[int, ...] = ()
@@ -51,17 +43,15 @@ class QTable(Scheduler):
     return weights / weights.sum()
 
   def next_task(self) -> int:
-    """Chooses a task, then cools down."""
-    task = int(self._generator.choice(self._tasks, p=self.probabilities()))
+    """Draws a task, then cools down."""
+    task = super().next_task()
     self._history = (*self._history, task)
-    self.temperature = max(self.temperature * self._decay, self._minimum)
+    cooler = self.temperature * self._config.decay
+    self.temperature = max(cooler, self._config.minimum)
     return task
 
   def end_episode(self, main_returns: Sequence[float]) -> None:
-    """Moves Q of every prefix of the history towards its return.
-
-    Args:
-      main_returns: G_h for each choice h of the episode.
+    """Moves Q of every prefix of the history towards its return G_h.
 
     Raises:
       ValueError: there is not one return for each choice.
@@ -70,12 +60,10 @@ class QTable(Scheduler):
       raise ValueError(
         f"{len(main_returns)} returns for {len(self._history)} choices"
       )
+    phi = self._config.phi
     for period, main_return in enumerate(main_returns):
       prefix = self._history[: period + 1]
-      old = self._table.get(prefix, 0.0)
-      self._table[prefix] = (1 - self._phi) * old + self._phi * float(
-        main_return
-      )
+      self._table[prefix] = (1 - phi) * self.value(prefix) + phi * main_return
 
   def state_dict(self) -> dict[str, Any]:
     """Histories int64 [n, longest], padded by -1, values [n], temperature."""
@@ -92,11 +80,10 @@ class QTable(Scheduler):
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
     super().load_state_dict(state)
+    rows = zip(state["histories"], state["values"], strict=True)
     self._table = {
       tuple(int(task) for task in history if task >= 0): float(value)
-      for history, value in zip(
-        state["histories"], state["values"], strict=True
-      )
+      for history, value in rows
     }
     self.temperature = float(state["temperature"])
     self._history = ()

@@ -13,12 +13,7 @@ _SENSORS = {
 
 
 class Block(Body):
-  """A free 4 cm cube of 100 g.
-
-  Attributes:
-    geom: the cube.
-    sensors: sensor elements by quantity, all in the world frame.
-  """
+  """A free 4 cm cube of 100 g; its sensors are in the world frame."""
 
   def _build(self, name: str, rgba) -> None:
     root = self._start_model(name)

@@ -4,11 +4,7 @@ from dm_control import composer, mjcf
 
 
 class Body(composer.Entity):
-  """An entity whose only contacts are the pairs of `contacts.py`.
-
-  Attributes:
-    mjcf_model: its own MJCF tree.
-  """
+  """An entity whose only contacts are the pairs of `contacts.py`."""
 
   mjcf_model: mjcf.RootElement = None  # abstract in Composer
 

@@ -35,12 +35,9 @@ class Panda(Body):
   Attributes:
     joints: the arm's seven, from the base.
     finger_joints: the slides of the left (+y of the hand) and right finger.
-    tcp: the tool centre point, a site between the pads.
-    wrist: the site of the force-torque sensor.
+    tcp, wrist: sites between the pads, and of the force-torque sensor.
     sensors: sensor elements by quantity; positions in the world frame.
     hanging_bodies: what hangs beyond the wrist sensor: hand and fingers.
-    pads_and_fingers: the boxes of both fingers.
-    hand_geom: the box around the palm.
     collision_geoms: every primitive: arm capsules, palm, fingers.
   """
 

@@ -11,12 +11,7 @@ _RGBA = (0.80, 0.79, 0.76, 1.0)
 
 
 class Tray(Body):
-  """A fixed tray of boxes.
-
-  Attributes:
-    wall_geoms: the four sloped walls.
-    geoms: everything that a block can touch.
-  """
+  """A fixed tray of boxes; `geoms` is everything that a block can touch."""
 
   def _build(self, name: str = "tray") -> None:
     root = self._start_model(name)

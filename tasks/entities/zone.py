@@ -9,11 +9,7 @@ _LIT_EMISSION = 0.6
 
 
 class Zone(Body):
-  """A visual frame of four strips around a slot; it touches nothing.
-
-  Attributes:
-    is_lit: whether its block is in it.
-  """
+  """A visual frame of four strips around a slot; it touches nothing."""
 
   def _build(self, name: str, xy, rgba) -> None:
     root = self._start_model(name)

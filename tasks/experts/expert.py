@@ -39,11 +39,7 @@ class ScriptedExpert:
   tasks = ALL_TASKS
 
   def __init__(self, noise: float = _NOISE, control_hz: int = 20):
-    """Makes the actor.
-
-    Args:
-      noise: std of the Gaussian action noise.
-      control_hz: control steps a second of the environment.
+    """Takes the noise's std and the environment's control rate.
 
     Raises:
       ValueError: a negative or non-finite `noise`.

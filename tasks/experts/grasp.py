@@ -31,10 +31,9 @@ _OPENING = 0.02  # change of the opening in a step while fingers open
 
 
 def _room(view: View, target: BlockView) -> tuple[float, float] | None:
-  """Offset of the grip from the target's centre at which the fingers fit.
+  """Offset x, y, m, from the target's centre at which the fingers fit.
 
-  Returns:
-    Along x and y, m; None if the other block leaves no room.
+  None: the other block leaves no room.
   """
   other = view.other(target)
   if abs(other.z - target.z) > 0.030:

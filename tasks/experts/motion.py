@@ -30,16 +30,10 @@ def clip(value: float, low: float, high: float) -> float:
 def servo(
   view: View, goal: Vector, speed: float = _SPEED, gain: float = _GAIN
 ) -> Vector:
-  """Moves the set-point straight to a goal, slowing down softly.
+  """The move that takes the set-point straight to a goal, m, softly braking.
 
-  Args:
-    view: the observation.
-    goal: of the TCP, m.
-    speed: largest |a|.
-    gain: share of the remaining way to cover in 50 ms, near the goal.
-
-  Returns:
-    The action's first three values.
+  `speed` is the largest |a|, `gain` the share of the remaining way to cover in
+  50 ms, near the goal.
   """
   share = 1.0 - (1.0 - gain) ** (_GAIN_HZ / view.control_hz)
   wanted = [
@@ -64,16 +58,8 @@ def from_above(
 ) -> Vector:
   """Servoes to a goal through a funnel: high when far, down when aligned.
 
-  Args:
-    view: the observation.
-    goal: of the TCP, m.
-    hover: height of the TCP on the way, m.
-    narrow: horizontal error at which the funnel ends, m.
-    slope: metres of height for a metre of horizontal error.
-    gain: as in `servo`.
-
-  Returns:
-    The action's first three values.
+  On the way the TCP is at height `hover`. The funnel ends at a horizontal
+  error of `narrow`, m; its slope is height over horizontal error.
   """
   x, y, z = goal
   at_x, at_y, at_z = view.tcp

@@ -8,11 +8,6 @@ from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-_BRING_RADIUS = 0.03  # m, to p_s
-_INSERT_RADIUS = 0.0025  # m, to p_s: reached by an inserted block alone
-_DONE = 0.02  # m, of the dense rewards' bonus for letting go
-_BRING_GOAL = (*ws.BLUE_XY, ws.FLAT_Z)  # a flat block in the zone
-
 
 def is_let_go(state: Snapshot, radius: float) -> bool:
   """Blue touches the tray and not the robot, within `radius` of p_s, m."""
@@ -23,7 +18,7 @@ def is_let_go(state: Snapshot, radius: float) -> bool:
 def dense_terms(state: Snapshot, goal, threshold: float) -> Terms:
   """Closeness of blue to `goal`, full within the threshold, m; then retreat."""
   is_near = state.distance <= terms.NEAR
-  is_done = math.dist(state.blue, goal) < _DONE
+  is_done = math.dist(state.blue, goal) < 0.02  # m
   is_opening = state.action[3] < 0.0
   return {
     "goal": terms.closeness(threshold, state.blue, goal) if is_near else 0.0,
@@ -33,11 +28,11 @@ def dense_terms(state: Snapshot, goal, threshold: float) -> Terms:
 
 BRING = Goal(
   "bring",
-  functools.partial(is_let_go, radius=_BRING_RADIUS),
-  functools.partial(dense_terms, goal=_BRING_GOAL, threshold=0.02),
+  functools.partial(is_let_go, radius=0.03),
+  functools.partial(dense_terms, goal=(*ws.BLUE_XY, ws.FLAT_Z), threshold=0.02),
 )
 INSERT = Goal(
   "insert",
-  functools.partial(is_let_go, radius=_INSERT_RADIUS),
+  functools.partial(is_let_go, radius=0.0025),  # only an inserted block's
   functools.partial(dense_terms, goal=ws.BLUE_SLOT, threshold=0.001),
 )

@@ -13,20 +13,13 @@ Terms = dict[str, float]
 class Goal:
   """One of the nine tasks.
 
-  Attributes:
-    name: the task's name.
-    condition: the success condition at one instant (appendix "Evaluation" of
-      the paper; numbers of the released code).
-    dense_terms: named terms of the dense reward, whose sum is the reward.
-    is_penalised_off_tray: whether the penalty for a green block that does not
-      lie flat applies, in episodes with one (`BlockStart.penalises_green`).
-    hold_checks: consecutive 50 ms checks before the condition is a success.
-    start: the blocks' arrangement at the start of this task's episodes.
+  Conditions are of the paper's appendix "Evaluation", with numbers of the
+  released code.
   """
 
   name: str
-  condition: Callable[[Snapshot], bool]
-  dense_terms: Callable[[Snapshot], Terms]
-  is_penalised_off_tray: bool = False
-  hold_checks: int = 10
-  start: starts.BlockStart = starts.APART
+  condition: Callable[[Snapshot], bool]  # of success, at one instant
+  dense_terms: Callable[[Snapshot], Terms]  # by name; their sum is the reward
+  is_penalised_off_tray: bool = False  # see `BlockStart.penalises_green`
+  hold_checks: int = 10  # consecutive 50 ms checks until it is a success
+  start: starts.BlockStart = starts.APART  # of this task's episodes

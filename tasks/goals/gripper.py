@@ -7,13 +7,10 @@ from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-_OPEN, _CLOSE = -1.0, 1.0  # signs of a_g
-_SLOW = 0.08  # m/s, TCP
-
 
 def is_commanded(state: Snapshot, sign: float) -> bool:
   """a_g of that sign, a block within 10 cm, the TCP slower than 8 cm/s."""
-  is_slow = state.tcp_speed < _SLOW
+  is_slow = state.tcp_speed < 0.08
   return sign * state.action[3] > 0.0 and is_slow and _is_near_a_block(state)
 
 
@@ -40,5 +37,5 @@ def _goal(name: str, sign: float) -> Goal:
   )
 
 
-OPEN_GRIPPER = _goal("open_gripper", _OPEN)
-CLOSE_GRIPPER = _goal("close_gripper", _CLOSE)
+OPEN_GRIPPER = _goal("open_gripper", -1.0)
+CLOSE_GRIPPER = _goal("close_gripper", 1.0)

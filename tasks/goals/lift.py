@@ -4,13 +4,12 @@ from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-_HEIGHT = 0.06  # m above where the block lies flat
 _TOP = 0.08  # m, where the dense reward is full
 
 
 def is_lifted(state: Snapshot) -> bool:
   """Blue's centre is more than 6 cm above where it lies flat."""
-  return state.height > _HEIGHT
+  return state.height > 0.06
 
 
 def dense_terms(state: Snapshot) -> Terms:

@@ -4,19 +4,15 @@ from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-_SPEED = 0.05  # m/s
-_ACCELERATION = 5.0  # m/s^2
-_AT_BLOCK = 0.04  # m, TCP to blue
-
 
 def is_moving(state: Snapshot) -> bool:
   """|v_b| > 5 cm/s and |a_b| < 5 m/s^2."""
-  return state.blue_speed > _SPEED and state.blue_acceleration < _ACCELERATION
+  return state.blue_speed > 0.05 and state.blue_acceleration < 5.0
 
 
 def dense_terms(state: Snapshot) -> Terms:
   """Speed minus jerks at the block; bonuses near it and for carrying it."""
-  at_block = 1.0 if state.distance < _AT_BLOCK else 0.0
+  at_block = 1.0 if state.distance < 0.04 else 0.0  # m
   is_carried = (
     state.has_fingers_between(*terms.CLOSED_ON_BLOCK) and state.height > 0.005
   )

@@ -4,12 +4,10 @@ from lfgp_dmc.tasks.goals import terms
 from lfgp_dmc.tasks.goals.goal import Goal, Terms
 from lfgp_dmc.tasks.snapshot import Snapshot
 
-_RADIUS = 0.015  # m
-
 
 def is_reached(state: Snapshot) -> bool:
   """|p_e - p_b| < 1.5 cm."""
-  return state.distance < _RADIUS
+  return state.distance < 0.015
 
 
 def dense_terms(state: Snapshot) -> Terms:

@@ -11,23 +11,13 @@ from lfgp_dmc.tasks.snapshot import Snapshot
 
 @dataclass(frozen=True)
 class BlockStart:
-  """One arrangement.
+  """One arrangement."""
 
-  Attributes:
-    place_green: green's pose from blue's and from one sampled on the floor,
-      float [7] each.
-    is_settled: whether the blocks, come to rest, are arranged so.
-    penalises_green: whether goals with `is_penalised_off_tray` lose reward
-      while green does not lie flat.
-  """
-
+  # Green's pose from blue's and from one sampled on the floor, float [7] each.
   place_green: Callable[[np.ndarray, np.ndarray], np.ndarray]
-  is_settled: Callable[[Snapshot], bool]
+  is_settled: Callable[[Snapshot], bool]  # blocks at rest are arranged so
+  # Goals with `is_penalised_off_tray` lose reward unless green lies flat.
   penalises_green: bool = False
-
-
-def _as_sampled(blue: np.ndarray, sampled: np.ndarray) -> np.ndarray:
-  return sampled
 
 
 def _are_flat(state: Snapshot) -> bool:
@@ -44,5 +34,5 @@ def _is_green_on_blue(state: Snapshot) -> bool:
   return abs(state.green[2] - state.blue[2] - 2 * ws.BLOCK_HALF) < 0.001
 
 
-APART = BlockStart(_as_sampled, _are_flat)
+APART = BlockStart(lambda blue, sampled: sampled, _are_flat)
 GREEN_ON_BLUE = BlockStart(_on_top, _is_green_on_blue, penalises_green=True)

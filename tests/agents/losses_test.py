@@ -11,7 +11,6 @@ from lfgp_dmc.agents.losses import (
   critic,
   discriminator,
   intention,
-  temperature,
 )
 from lfgp_dmc.agents.networks import tanh_gaussian
 
@@ -90,7 +89,7 @@ class PolicyLossesTest(absltest.TestCase):
 
   def test_temperature_falls_while_entropy_is_above_the_target(self):
     log_temperature = torch.tensor([LN2], requires_grad=True)
-    loss, _ = temperature.temperature_loss(
+    loss, _ = intention.temperature_loss(
       log_temperature, torch.tensor([[1.0, 3.0]]), target_entropy=-4.0
     )
     self.assertAlmostEqual(loss.item(), 4.0, places=5)  # -2 (2 - 4)

@@ -8,7 +8,9 @@ from absl.testing import absltest, parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.agents import schedulers
-from lfgp_dmc.agents.schedulers import conditional, handcrafted, q_table
+from lfgp_dmc.agents.schedulers import conditional, handcrafted
+from lfgp_dmc.agents.schedulers.config import QTableConfig
+from lfgp_dmc.agents.schedulers.q_table import QTable
 from tests.agents import fixtures
 
 NAMES = (
@@ -30,6 +32,10 @@ class _Scripted:
   def choice(self, size, p):
     del size, p
     return next(self._choices)
+
+
+def _table(tasks, generator, **fields):
+  return QTable(tasks, generator, QTableConfig(**fields))
 
 
 def _make(name, main="stack", seed=0):
@@ -61,7 +67,7 @@ class QTableTest(absltest.TestCase):
     return table
 
   def test_moving_average_over_all_prefixes(self):
-    table = q_table.QTable(2, _Scripted([0, 1, 0, 0]), phi=0.6)
+    table = _table(2, _Scripted([0, 1, 0, 0]), phi=0.6)
     self._play(table, [10.0, 20.0])
     self.assertAlmostEqual(table.value([0]), 6.0)
     self.assertAlmostEqual(table.value([0, 1]), 12.0)
@@ -72,20 +78,18 @@ class QTableTest(absltest.TestCase):
     self.assertEqual(table.value([1]), 0.0)
 
   def test_boltzmann_probabilities(self):
-    table = q_table.QTable(
-      3, _Scripted([1]), phi=1.0, temperature=2.0, decay=1.0
-    )
+    table = _table(3, _Scripted([1]), phi=1.0, temperature=2.0, decay=1.0)
     found = self._play(table, [2 * math.log(4)]).probabilities()
     # exp(Q / T) = 1, 4, 1.
     np.testing.assert_allclose(found, [1 / 6, 4 / 6, 1 / 6])
 
   def test_huge_values_do_not_overflow(self):
-    table = q_table.QTable(2, _Scripted([0]), phi=1.0, temperature=0.1)
+    table = _table(2, _Scripted([0]), phi=1.0, temperature=0.1)
     found = self._play(table, [1e6]).probabilities()
     np.testing.assert_allclose(found, [1.0, 0.0])
 
   def test_temperature_falls_at_every_choice_down_to_the_minimum(self):
-    table = q_table.QTable(
+    table = _table(
       2, np.random.default_rng(0), temperature=360, decay=0.5, minimum=100
     )
     table.begin_episode()
@@ -96,7 +100,7 @@ class QTableTest(absltest.TestCase):
     self.assertEqual(seen, [180, 100, 100])
 
   def test_returns_must_match_the_choices(self):
-    table = q_table.QTable(2, np.random.default_rng(0))
+    table = _table(2, np.random.default_rng(0))
     table.begin_episode()
     table.next_task()
     with self.assertRaisesRegex(ValueError, "2 returns for 1 choices"):

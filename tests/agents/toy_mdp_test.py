@@ -5,7 +5,7 @@ from absl.testing import absltest, parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.agents import schedulers
-from lfgp_dmc.agents.schedulers import q_table
+from lfgp_dmc.agents.schedulers.config import QTableConfig
 from tests.agents import fixtures
 
 TASKS = task_names.task_set("stack")
@@ -17,8 +17,8 @@ class SequenceTest(absltest.TestCase):
   """A period pays 10 if it stacks what the one before it has lifted."""
 
   def test_q_table_finds_the_best_sequence(self):
-    table = q_table.QTable(
-      len(TASKS), np.random.default_rng(0), temperature=20.0, decay=0.9995
+    table = schedulers.make_scheduler(
+      QTableConfig(temperature=20.0), TASKS, np.random.default_rng(0)
     )
     totals = []
     for _ in range(2500):

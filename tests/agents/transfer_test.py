@@ -70,6 +70,17 @@ class CarryOverTest(parameterized.TestCase):
         expected = old["output.weight"][OLD.index(task)]
       np.testing.assert_array_equal(new["output.weight"][index], expected)
 
+  def test_the_main_head_comes_along_on_request(self):
+    tasks = ("bring", "open_gripper", "reach")
+    agent, old = _agent(tasks), _networks(_trained())
+    agent.carry_over(old, OLD, 3, main_head=True)
+    np.testing.assert_equal(_networks(agent)["intentions"], old["intentions"])
+    np.testing.assert_equal(_networks(agent)["critics"], old["critics"])
+    agent.prepare()  # the task is new all the same
+    self.assertEqual(agent.learner.updates, 3)
+    with self.assertRaisesRegex(ValueError, "move_object is a task of this"):
+      _agent(NEW).carry_over(old, OLD, main_head=True)
+
   def test_temperatures_optimisers_and_scheduler_stay_fresh(self):
     agent, untouched = _agent(NEW), _agent(NEW)
     agent.carry_over(_networks(_trained()), OLD)
