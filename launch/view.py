@@ -4,9 +4,13 @@
   python launch/view.py --task=insert --expert=scripted
   python launch/view.py --run=runs/stack_1 --task=reach
 
-Without --run or --expert the arm holds still, to be looked at and pushed.
+With an actor, page down and page up switch to its next and last task. Without
+--run or --expert the arm holds still, to be looked at and pushed.
 """
 
+import functools
+
+import dm_env
 import numpy as np
 from absl import flags
 
@@ -42,23 +46,49 @@ def main() -> None:
   _open(spec, task or lfgp_dmc.MAIN_TASKS[0])
 
 
+class _Player:
+  """The viewer's policy: an actor at one of its tasks."""
+
+  def __init__(self, spec: policies.PolicySpec, flatten, task: str):
+    self._actor, self._flatten = spec.make(), flatten
+    self._tasks, self._index = spec.tasks, spec.tasks.index(task)
+    self.switch(0)
+
+  def __call__(self, timestep: dm_env.TimeStep) -> np.ndarray:
+    if timestep.first():
+      self.switch(0)
+    return self._actor.act(self._flatten(timestep.observation))
+
+  def switch(self, by: int) -> str:
+    """Begins the task that is `by` further on; returns its name."""
+    self._index = (self._index + by) % len(self._tasks)
+    self._actor.begin(self._tasks[self._index], _SEED.value)
+    return self._tasks[self._index]
+
+
 def _open(spec: policies.PolicySpec | None, task: str) -> None:
-  from dm_control import viewer
+  from dm_control.viewer import application, user_input
 
   world = spec.world if spec else EnvironmentSpec(task)
   environment = world.build(seed=_SEED.value)
-  policy = None
+  app = application.Application(title=_title(task))
+  player = None
   if spec:
-    actor, flatten = spec.make(), environments.flattener(environment)
+    player = _Player(spec, environments.flattener(environment), task)
 
-    def policy(timestep) -> np.ndarray:
-      if timestep.first():
-        actor.begin(task, _SEED.value)
-      return actor.act(flatten(timestep.observation))
+    def switch(by: int) -> None:
+      app._window.set_title(_title(player.switch(by)))
 
+    # The viewer has no public way to bind keys.
+    app._input_map.bind(functools.partial(switch, 1), user_input.KEY_PAGE_DOWN)
+    app._input_map.bind(functools.partial(switch, -1), user_input.KEY_PAGE_UP)
   print("space starts and pauses, backspace resets, [ and ] change the camera,")
-  print("F1 shows all keys")
-  viewer.launch(environment, policy, title=f"LfGP-DMC: {task}")
+  print("page down and page up the actor's task; F1 shows all other keys")
+  app.launch(environment, player)
+
+
+def _title(task: str) -> str:
+  return f"LfGP-DMC: {task}"
 
 
 if __name__ == "__main__":

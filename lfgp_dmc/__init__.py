@@ -2,16 +2,15 @@
 
     import lfgp_dmc
     environment = lfgp_dmc.load("stack", seed=0)
-    act = lfgp_dmc.load_policy("runs/NAME", "stack")
+    policy = lfgp_dmc.load_policy("runs/NAME")
     timestep = environment.reset()
-    action = act(lfgp_dmc.flatten(timestep.observation))
+    action = policy(lfgp_dmc.flatten(timestep.observation))
 
 This facade reaches `tasks` and `agents` inside its functions only: importing it
 loads neither a simulator nor torch.
 """
 
 import os
-from collections.abc import Callable
 from typing import Any
 
 import dm_env
@@ -33,6 +32,7 @@ __all__ = [
   "MAIN_TASKS",
   "OBSERVATION_SIZE",
   "OBSERVATION_SLICES",
+  "StoredPolicy",
   "conditions",
   "flatten",
   "load",
@@ -66,10 +66,50 @@ def load(
   return tasks.load(task, seed=seed, **options)
 
 
+class StoredPolicy:
+  """A trained policy: called with an observation, one of its intentions acts.
+
+      policy = lfgp_dmc.load_policy("results/policies/stack")
+      policy.intentions  # ("stack", "open_gripper", ..., "move_object")
+      action = policy(observation)
+      action = policy(observation, "reach")
+      policy.intention = "lift"  # acts from now on
+
+  Attributes:
+    intentions: the names of its tasks, the main task first.
+    intention: the name of the one that acts unless a call names another.
+  """
+
+  def __init__(self, policy: Any, intention: str, seed: int):
+    """Wraps an `agents.policy.Policy`; `load_policy` makes these."""
+    policy.begin(intention, seed)
+    self._policy = policy
+    self.intentions: tuple[str, ...] = policy.tasks
+    self.intention = intention
+
+  def __call__(
+    self, observation: np.ndarray, intention: str | None = None
+  ) -> np.ndarray:
+    """Acts by the mean action of an intention.
+
+    Args:
+      observation: float32 [O] or, a row each, [B, O]; of the block tasks what
+        `flatten` returns.
+      intention: its name; None: `self.intention`.
+
+    Returns:
+      The action, float32 [A] or [B, A], in [-1, 1].
+
+    Raises:
+      ValueError: there is no such intention; the message lists them.
+    """
+    return self._policy.act(observation, intention or self.intention)
+
+
 def load_policy(
   run_folder: str | os.PathLike[str], task: str | None = None, seed: int = 0
-) -> Callable[[np.ndarray], np.ndarray]:
-  """Loads a trained intention as a plain function.
+) -> StoredPolicy:
+  """Loads a trained policy as a plain function.
 
   Args:
     run_folder: `runs/NAME`, or a policy folder (`config.json` and
@@ -81,8 +121,9 @@ def load_policy(
     A callable from an observation, float32 [O], to an action, float32 [A].
 
   Raises:
-    ValueError: the folder holds no policy, or the policy has no intention of
-      that name; the message names the file, or lists the intentions.
+    FileNotFoundError: the folder holds no policy; the message names the file.
+    ValueError: a file is damaged, or the policy has no intention of that name;
+      the message names the file, or lists the intentions.
   """
   from lfgp_dmc.agents.policy import Policy
 
@@ -93,5 +134,4 @@ def load_policy(
       f"{os.fspath(run_folder)} has no intention {task!r}; it has: "
       f"{', '.join(policy.tasks)}"
     )
-  policy.begin(task, seed)
-  return policy.act
+  return StoredPolicy(policy, task, seed)

@@ -85,12 +85,11 @@ class OwnTaskTest(fixtures.FolderTest):
       _write_files(self.folder),
     )
     (self.folder / "launch").symlink_to(pages.ROOT / "launch")
-    *_, sacx, demonstrate, check, lfgp = pages.commands(_PAGE)
+    *_, demonstrate, check, lfgp = pages.commands(_PAGE)
     short = (
       "--config.env_steps=150 --config.warm_up=60 --config.random_steps=60"
       " --config.agent.networks.hidden_size=16 --config.evaluation_episodes=2"
     )
-    self.assertRegex(self._call(f"{sacx} {short}"), r"(?s)right .*left ")
     self._call(demonstrate)
     self.assertIn("rows of success: 20; control rate: 10 Hz", self._call(check))
     self.assertRegex(self._call(f"{lfgp} {short}"), r"(?s)right .*left ")

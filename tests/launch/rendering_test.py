@@ -40,25 +40,43 @@ class PolicyTest(absltest.TestCase):
     with self.assertRaisesRegex(ValueError, "no intention 'insert'; it has"):
       lfgp_dmc.load_policy(_POLICY, "insert")
 
-  def test_acts_in_the_viewer_for_the_named_task(self):
-    reach = lfgp_dmc.load_policy(_POLICY, "reach")
+  def test_keys_of_the_viewer_switch_intentions(self):
+    stored = lfgp_dmc.load_policy(_POLICY)
+    app, keys = mock.MagicMock(), {}
+    app._input_map.bind.side_effect = lambda act, key: keys.update({key: act})
+    shown = app._window.set_title
 
-    def launch(environment, policy, title):
-      self.assertEqual(title, "LfGP-DMC: reach")
+    def launch(environment, policy):
       timestep = environment.reset()
-      for _ in range(3):
-        action = policy(timestep)
-        expected = reach(lfgp_dmc.flatten(timestep.observation))
-        np.testing.assert_array_equal(action, expected)
-        timestep = environment.step(action)
+      for key, task in (
+        (None, "reach"),
+        ("down", "lift"),
+        ("up", "reach"),
+        ("up", "close_gripper"),
+      ):
+        if key:
+          keys[key]()
+          self.assertEqual(shown.call_args.args, (f"LfGP-DMC: {task}",))
+        expected = stored(lfgp_dmc.flatten(timestep.observation), task)
+        np.testing.assert_array_equal(policy(timestep), expected)
+        timestep = environment.step(expected)
+        self.assertFalse(timestep.first())
+      # A reset keeps the task.
+      policy(environment.reset())
+      np.testing.assert_array_equal(
+        policy(timestep), stored(lfgp_dmc.flatten(timestep.observation), task)
+      )
 
-    viewer = mock.Mock(launch=mock.Mock(side_effect=launch))
-    with (
-      mock.patch.dict(sys.modules, {"dm_control.viewer": viewer}),
-      mock.patch("dm_control.viewer", viewer, create=True),
-    ):
+    app.launch.side_effect = launch
+    viewer = mock.Mock()
+    viewer.application.Application.return_value = app
+    viewer.user_input = mock.Mock(KEY_PAGE_DOWN="down", KEY_PAGE_UP="up")
+    with mock.patch.dict(sys.modules, {"dm_control.viewer": viewer}):
       view._open(policies.find(_POLICY, ""), "reach")
-    viewer.launch.assert_called_once()
+    viewer.application.Application.assert_called_once_with(
+      title="LfGP-DMC: reach"
+    )
+    app.launch.assert_called_once()
 
 
 @unittest.skipIf(graphics.fault(), graphics.fault())
