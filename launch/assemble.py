@@ -12,9 +12,10 @@ from lfgp_dmc import seeding, task_names
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import command, datasets, environment_spec, policies
+from lfgp_dmc.launch import command, datasets, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
+from lfgp_dmc.observations import REWARD_PREFIX, SUCCESS_PREFIX
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import TrainSchedule
@@ -41,7 +42,7 @@ def make_parts(config: RunConfig) -> Parts:
   """
   device = _set_up_torch(config)
   with command.checked_input():
-    environment = config.world.build(config.keeps_rewards)
+    environment = config.environment_spec.build(config.agent.keeps_rewards)
     tasks = tasks_of(config, environment)
     widths = environments.widths(environment)
   demonstrations = datasets.load(config, tasks, widths)
@@ -52,10 +53,11 @@ def tasks_of(
   config: RunConfig, environment: dm_env.Environment
 ) -> tuple[str, ...]:
   """The tasks that are learned, the main task first."""
+  alone = (config.main_task,)
   if not ALGORITHMS[config.algorithm].is_multitask:
-    return (config.main_task,)
+    return alone
   if config.environment:
-    return environment_spec.tasks_of(environment, config.main_task)
+    return environments.with_observed_tasks(environment, alone, SUCCESS_PREFIX)
   return task_names.task_set(config.main_task)
 
 
@@ -64,9 +66,9 @@ def make_replay(
 ) -> Replay:
   """An empty replay, or the one that the folder holds."""
   reward_tasks: tuple[str, ...] = ()
-  if config.keeps_rewards:  # all that are observed, for transfers
-    reward_tasks = environments.tasks_with_rewards(
-      parts.environment, parts.tasks
+  if config.agent.keeps_rewards:  # all that are observed, for transfers
+    reward_tasks = environments.with_observed_tasks(
+      parts.environment, parts.tasks, REWARD_PREFIX
     )
   # A full ring must still hold the rows of the last checkpoint.
   is_ring = config.replay_capacity < config.env_steps or config.transfer_from
@@ -105,7 +107,7 @@ def make_run(
   replay = None if is_supervised else make_replay(config, parts, folder.replay)
   evaluate = functools.partial(
     evaluation.evaluate,
-    config.world.factory(show_rewards=True),
+    functools.partial(config.environment_spec.build, True),
     functools.partial(policies.stored_policy, os.fspath(folder.path)),
     parts.tasks,
     config.evaluation_episodes,

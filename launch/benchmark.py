@@ -8,6 +8,8 @@ python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
 
 import csv
+import functools
+import importlib
 import pathlib
 from collections.abc import Iterator
 
@@ -79,30 +81,21 @@ def main() -> None:
 
 
 def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
+  what, seed, seconds = _WHAT.value, _SEED.value, _SECONDS.value
+  steps = _STEPS.value or _DEFAULT_STEPS[what]
+  arguments: dict[str, tuple] = {
+    "environment": (steps, seed),
+    "learner": (config, seconds),
+    "training": (config, steps, seconds),
+    "memory": (config, steps),
+    "stability": (_TASKS.value, steps, seed),
+  }
   # Imported when needed: each needs only the simulator or only torch.
-  steps = _STEPS.value or _DEFAULT_STEPS[_WHAT.value]
-  match _WHAT.value:
-    case "environment":
-      from lfgp_dmc.launch.benchmarks import environment
+  module = importlib.import_module(f"lfgp_dmc.launch.benchmarks.{what}")
+  return module.measure(*arguments[what])
 
-      yield from environment.measure(steps, _SEED.value)
-    case "learner":
-      from lfgp_dmc.launch.benchmarks import learner
 
-      yield from learner.measure(config, _SECONDS.value)
-    case "training":
-      from lfgp_dmc.launch.benchmarks import training
-
-      yield from training.measure(config, steps, _SECONDS.value)
-    case "memory":
-      from lfgp_dmc.launch.benchmarks import memory
-
-      yield from memory.measure(config, steps)
-    case "stability":
-      from lfgp_dmc.launch.benchmarks import stability
-
-      yield from stability.measure(_TASKS.value, steps, _SEED.value)
-
+cli = functools.partial(command.run, main, define_flags=config_flags.define)
 
 if __name__ == "__main__":
-  command.run(main, define_flags=config_flags.define)
+  cli()

@@ -9,6 +9,7 @@ shows an attempt of each task in the block world, a row of frames each.
 """
 
 import contextlib
+import functools
 import pathlib
 
 import numpy as np
@@ -115,5 +116,7 @@ def _draw(strip: pathlib.Path, found: dict[str, Demonstrations]) -> None:
   print(strip)
 
 
+cli = functools.partial(command.run, main, render=True)
+
 if __name__ == "__main__":
-  command.run(main, render=True)
+  cli()

@@ -27,10 +27,10 @@ def play(
   """Records one episode, in an environment of its own.
 
   Args:
-    spec: the policy.
+    spec: of the policy.
     task: an intention, or `SCHEDULED`.
     seed: of the reset, the policy and the choice of tasks.
-    look: how frames are made.
+    look: of the frames.
     is_play: whether the expert goes from task to task.
     **limits: see `recorder.record`.
 
@@ -44,7 +44,7 @@ def play(
   if task == SCHEDULED:
     look = dataclasses.replace(look, scheduled_for=spec.main_task)
     switch = scheduled(spec, seed)
-  environment = spec.world.build(seed=seeding.derive(seed, "clip"))
+  environment = spec.environment_spec.build(seed=seeding.derive(seed, "clip"))
   with contextlib.closing(environment):
     if is_play:
       tasks = lfgp_dmc.task_set(spec.main_task)
@@ -58,11 +58,7 @@ def play(
 
 
 def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
-  """The run's own scheduler, as of its last checkpoint.
-
-  Raises:
-    UserError: a policy folder has no scheduler.
-  """
+  """The run's own scheduler, as of its last checkpoint."""
   if spec.folder is None or "agent" not in spec.config:
     raise command.UserError("--task=scheduled needs the folder of a whole run")
   from lfgp_dmc.agents.schedulers import make_scheduler

@@ -19,33 +19,37 @@ from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
 
-_TASK = flags.DEFINE_string(
-  "task", "stack", "Main task (or any of the nine): its T_all is collected."
+_TASK = flags.DEFINE_enum(
+  "task", "stack", lfgp_dmc.ALL_TASKS, "The task whose T_all is collected."
 )
 _TASKS = flags.DEFINE_list("tasks", None, "Only these of T_all, a,b,...")
-_COLLECTION = flags.DEFINE_string(
-  "collection", "reset", "reset (before each attempt) or play (none between)."
+_COLLECTION = flags.DEFINE_enum(
+  "collection", "reset", collection.COLLECTIONS, "play: no resets in between."
 )
-_PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.")
+_PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.", 1)
 _FINALS = flags.DEFINE_integer(
   "final_pairs",
   0,
   "Extra pairs a task: the row of success of so many further attempts. The "
   "journal version's 1000 pairs: --pairs_per_task=800 --final_pairs=200.",
+  lower_bound=0,
 )
 _LONGEST = flags.DEFINE_integer(
   "keep_longest_of",
   1,
   "Keep the longest of so many attempts: hard starts are over-sampled. With "
   "--collection=reset.",
+  lower_bound=1,
 )
-_SEED = flags.DEFINE_integer("seed", 0, "Everything random follows from it.")
+_SEED = flags.DEFINE_integer(
+  "seed", 0, "Everything random follows from it.", lower_bound=0
+)
 _OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
 _EXPERT = flags.DEFINE_string(
   "expert", "scripted", "scripted, or the folder of a run or policy."
 )
 _WORKERS = flags.DEFINE_integer(
-  "workers", 0, "Processes; 0: one a core. The data are the same."
+  "workers", 0, "Processes; 0: one a core. The data are the same.", 0
 )
 
 _HERTZ = flags.DEFINE_integer(
@@ -90,20 +94,16 @@ def main() -> int:
 
 
 def _plan() -> CollectionPlan:
-  """Who plays what, where.
-
-  Raises:
-    UserError: the expert cannot do all tasks, or acts at another rate.
-  """
+  """Who plays what, where; the expert must know all tasks, at this rate."""
   spec = policies.find("", _EXPERT.value, _TASK.value, _HERTZ.value)
   make_actor = spec.make
   if _EXPERT.value != policies.SCRIPTED:
     make_actor = functools.partial(sampling_actor, spec.make)
   tasks = lfgp_dmc.task_set(_TASK.value)
-  if spec.world.control_hz != _HERTZ.value:
+  if spec.environment_spec.control_hz != _HERTZ.value:
     raise command.UserError(
       f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
-      f"{spec.world.control_hz} Hz"
+      f"{spec.environment_spec.control_hz} Hz"
     )
   lacking = [task for task in tasks if task not in spec.tasks]
   if lacking:
@@ -124,19 +124,12 @@ def _plan() -> CollectionPlan:
 
 def _check_flags() -> tuple[pathlib.Path, list[str]]:
   """The output folder and the tasks to collect."""
-  command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
-  command.check_choice("collection", _COLLECTION.value, collection.COLLECTIONS)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
-  command.check_least("pairs_per_task", _PAIRS.value, 1)
-  command.check_least("final_pairs", _FINALS.value, 0)
-  command.check_least("keep_longest_of", _LONGEST.value, 1)
   if _LONGEST.value > 1 and _COLLECTION.value != "reset":
     raise command.UserError(
       f"--keep_longest_of={_LONGEST.value}; valid: 1 with --collection=play "
       "(its attempts follow from one another)"
     )
-  command.check_least("seed", _SEED.value, 0)
-  command.check_least("workers", _WORKERS.value, 0)
   valid = lfgp_dmc.task_set(_TASK.value)
   tasks = list(dict.fromkeys(_TASKS.value or valid))
   for task in tasks:
@@ -177,5 +170,7 @@ def _write(output: pathlib.Path, data: dict[str, Demonstrations]) -> None:
     os.rename(folder, output)
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

@@ -31,7 +31,8 @@ def run(
   """Runs a command and exits.
 
   Args:
-    main: the command; reads its own flags; its result is the exit status.
+    main: the command; its module's docstring and flags are the help, its result
+      is the exit status.
     render: whether it makes pictures (see `graphics.choose_backend`).
     window: whether it opens a window.
     define_flags: defines flags that depend on other arguments; gets them with
@@ -39,6 +40,7 @@ def run(
   """
   graphics.choose_backend(render, window)
   absl_logging.get_absl_handler().addFilter(_is_relevant)
+  _show_help_of(main.__module__)
 
   def guarded_main(argv: Sequence[str]) -> int | None:
     if len(argv) > 1:
@@ -46,14 +48,21 @@ def run(
     return guarded(main)
 
   def parse(argv: Sequence[str]) -> list[str]:
-    if define_flags is not None:
-      try:
+    try:
+      if define_flags is not None:
         define_flags(flags.FLAGS.read_flags_from_files(list(argv[1:])))
-      except (flags.Error, ValueError) as error:
-        sys.exit(_fail(str(error)))
-    return app.parse_flags_with_usage(list(argv))
+      return flags.FLAGS(list(argv))
+    except (flags.Error, ValueError) as error:
+      sys.exit(_fail(str(error)))
 
   app.run(guarded_main, flags_parser=parse)
+
+
+def _show_help_of(module: str) -> None:
+  """Makes `--help` that of a module which an installed script imported."""
+  sys.modules["__main__"].__doc__ = sys.modules[module].__doc__
+  for flag in flags.FLAGS.get_flags_for_module(module):
+    flags.FLAGS.register_key_flag_for_module(sys.argv[0], flag)
 
 
 def guarded(main: Callable[[], int | None]) -> int | None:
@@ -95,13 +104,6 @@ def check_choice(flag: str, value: _T, valid: Sequence[_T]) -> _T:
   if value not in valid:
     names = ", ".join(map(str, valid))
     raise UserError(f"--{flag}={value} is unknown; valid: {names}")
-  return value
-
-
-def check_least(flag: str, value: int, least: int) -> int:
-  """Returns `value`; raises UserError if it is below `least`."""
-  if value < least:
-    raise UserError(f"--{flag}={value}; valid: {least} or more")
   return value
 
 

@@ -19,10 +19,6 @@ def define(
 ) -> None:
   """Defines `--preset`, and `--config.*` for the algorithm, preset and kinds.
 
-  Args:
-    arguments: of the command, with flagfiles expanded.
-    flag_values: where to define them.
-
   Raises:
     ValueError: an unknown algorithm or preset.
   """
@@ -65,12 +61,8 @@ def define(
 def resolved(
   flag_values: flags.FlagValues = flags.FLAGS,
 ) -> configs.RunConfig:
-  """The checked config of the parsed flags.
-
-  Raises:
-    ValueError: a value out of its range.
-  """
-  return configs.to_run_config(flag_values.config)
+  """The config of the parsed flags; see `configs.from_dict`."""
+  return configs.from_dict(flag_values.config.to_dict())
 
 
 def is_given() -> bool:

@@ -10,6 +10,7 @@ takes all local ones under `ID/`; of others' datasets --attributes says what our
 files need: --attributes=task=stack,expert=human,...
 """
 
+import functools
 import pathlib
 
 from absl import flags
@@ -41,7 +42,10 @@ def main() -> None:
   folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"
   with command.checked_input():
     if not _BACK.value:
-      for path in _files(folder):
+      paths = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
+      if not paths:
+        raise UserError(f"no dataset in {folder}")
+      for path in paths:
         name = f"{prefix}{path.stem}-v0"
         minari_datasets.to_minari(demonstrations.read(path), name)
         print(name)
@@ -60,13 +64,6 @@ def main() -> None:
       print(path)
 
 
-def _files(folder: pathlib.Path) -> list[pathlib.Path]:
-  found = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
-  if not found:
-    raise UserError(f"no dataset in {folder}")
-  return found
-
-
 def _attributes() -> dict[str, str | int]:
   values: dict[str, str | int] = {}
   for pair in _ATTRIBUTES.value:
@@ -77,5 +74,7 @@ def _attributes() -> dict[str, str | int]:
   return values
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

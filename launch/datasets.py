@@ -16,46 +16,40 @@ _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 def load(
   config: RunConfig, tasks: Sequence[str], widths: tuple[int, int]
 ) -> dict[str, Demonstrations]:
-  """Task -> demonstrations, checked against the environment's widths.
-
-  Returns:
-    Those of the dataset's folder, or none if the agent uses none.
+  """Task -> demonstrations; none if the agent uses none.
 
   Raises:
     UserError: the dataset cannot be used; one line a faulty file.
   """
-  if not config.uses_demonstrations:
+  if not config.agent.uses_demonstrations:
     return {}
   if not config.demonstrations:
     raise UserError(
       "config.demonstrations is not set: give the dataset's folder, see "
       "launch/collect_demonstrations.py"
     )
+  from lfgp_dmc.tasks import mirror, published_examples
+
   folder = pathlib.Path(config.demonstrations)
   if not folder.exists():
     _collect(config)
   try:
-    found = _read(folder, tasks, widths)
+    if published_examples.is_folder_of_examples(folder):
+      found = published_examples.read_folder(folder, tasks)
+    else:
+      found = demonstrations.read_folder(folder, tasks, *widths)
     _check_rate(config, found)
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config, '...')}"
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
-  if config.mirror_demonstrations:
-    from lfgp_dmc.tasks import mirror
-
-    found = mirror.with_images(found)
-  return found
+  return mirror.with_images(found) if config.mirror_demonstrations else found
 
 
 def _counted(
   config: RunConfig, found: dict[str, Demonstrations]
 ) -> dict[str, Demonstrations]:
-  """The first `pairs_per_task` pairs of each task.
-
-  Raises:
-    UserError: a task has fewer.
-  """
+  """The first `pairs_per_task` pairs of each task, if it has them."""
   if not config.pairs_per_task:
     return found
   short = [
@@ -66,23 +60,11 @@ def _counted(
   if short:
     raise UserError(
       f"config.pairs_per_task is {config.pairs_per_task}; "
-      f"{config.demonstrations} has fewer "
-      f"pairs of {', '.join(short)}"
+      f"{config.demonstrations} has fewer pairs of {', '.join(short)}"
     )
   return {
     task: data.head(config.pairs_per_task) for task, data in found.items()
   }
-
-
-def _read(
-  folder: pathlib.Path, tasks: Sequence[str], widths: tuple[int, int]
-) -> dict[str, Demonstrations]:
-  """Reads our own files, or a folder of published examples of success."""
-  from lfgp_dmc.tasks import published_examples
-
-  if published_examples.is_folder_of_examples(folder):
-    return published_examples.read_folder(folder, tasks)
-  return demonstrations.read_folder(folder, tasks, *widths)
 
 
 def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
@@ -100,11 +82,7 @@ def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
 
 
 def _collect(config: RunConfig) -> None:
-  """Collects the dataset if `config.collect_pairs` says so.
-
-  Raises:
-    UserError: it could not be collected.
-  """
+  """Collects the dataset if `config.collect_pairs` says so."""
   if not config.collect_pairs:
     return
   command = _command(config, str(config.collect_pairs))
@@ -112,12 +90,6 @@ def _collect(config: RunConfig) -> None:
   arguments = [sys.executable, str(_COLLECT), *command.split()[2:]]
   if subprocess.run(arguments).returncode:
     raise UserError(f"{config.demonstrations} could not be collected")
-
-
-def pairs(found: dict[str, Demonstrations]) -> str:
-  """Such as "7 tasks, 63000 pairs"."""
-  total = sum(len(data) for data in found.values())
-  return f"{len(found)} tasks, {total} pairs"
 
 
 def _command(config: RunConfig, pairs_per_task: str) -> str:

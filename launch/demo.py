@@ -25,7 +25,6 @@ from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
-from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import figures, run_results
@@ -104,7 +103,6 @@ def _columns(
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
   rows = evaluation_csv.read_csv(path / "evaluation.csv")
-  last = max(row.env_step for row in rows)
   tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
@@ -113,28 +111,24 @@ def _columns(
   columns = {
     "untrained": untrained,
     "warm start": [row for row in rows if row.env_step == 0],
-    "trained": [row for row in rows if row.env_step == last],
+    "trained": evaluation_csv.newest(rows),
   }
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]
-    world = _world(config, stored)
+    at_its_rate = _at_rate_of(stored, config)
     name = str(stored.folder)
-    columns["stored"] = _evaluate(config, name, stored.make, able, world)
+    columns["stored"] = _evaluate(at_its_rate, name, stored.make, able)
   make = functools.partial(policies.scripted_expert, config.control_hz)
   columns["expert"] = _evaluate(config, "the scripted expert", make, tasks)
   return columns
 
 
 def _stored_policy(main_task: str) -> policies.PolicySpec | None:
-  """The policy to show beside the fresh one, if there is any.
-
-  Raises:
-    UserError: `--stored` names no policy that can do the task.
-  """
+  """The policy to show beside the fresh one, if there is any."""
   folder = _STORED.value or str(_POLICIES / main_task)
   if not _STORED.value and not pathlib.Path(folder).is_dir():
     return None
-  spec = policies.find(folder, "")
+  spec = policies.find(folder)
   if main_task not in spec.tasks:
     raise command.UserError(
       f"--stored={folder} cannot do {main_task}; it can do: "
@@ -143,21 +137,17 @@ def _stored_policy(main_task: str) -> policies.PolicySpec | None:
   return spec
 
 
-def _world(config: RunConfig, stored: policies.PolicySpec) -> EnvironmentSpec:
-  """The run's environment, at the control rate of the stored policy."""
-  return dataclasses.replace(config.world, control_hz=stored.world.control_hz)
+def _at_rate_of(stored: policies.PolicySpec, config: RunConfig) -> RunConfig:
+  rate = stored.environment_spec.control_hz
+  return dataclasses.replace(config, control_hz=rate)
 
 
 def _evaluate(
-  config: RunConfig,
-  name: str,
-  make_actor: Callable[[], Actor],
-  tasks: Sequence[str],
-  world: EnvironmentSpec | None = None,
+  config: RunConfig, name: str, make_actor: Callable, tasks: Sequence[str]
 ) -> list[EvaluationRow]:
   print(f"evaluating {name} on the same resets", flush=True)
   return evaluation.evaluate(
-    (world or config.world).factory(show_rewards=True),
+    functools.partial(config.environment_spec.build, True),
     make_actor,
     tasks,
     config.evaluation_episodes,
@@ -179,11 +169,11 @@ def _film(
   if graphics.fault():
     return None
   chosen = choose_episodes(config.main_task, columns["trained"])
-  frames = _play(config.world, policies.stored_policy(str(path)), chosen)
+  frames = _play(config, policies.stored_policy(str(path)), chosen)
   shown = [(path.name, row) for row in chosen]
   if stored is not None:
     best = choose_episodes(config.main_task, columns["stored"])[:1]
-    frames += _play(_world(config, stored), stored.make(), best)
+    frames += _play(_at_rate_of(stored, config), stored.make(), best)
     shown += [(stored.name, row) for row in best]
   return video.write(
     path / "video.mp4",
@@ -200,10 +190,10 @@ def _film(
 
 
 def _play(
-  world: EnvironmentSpec, actor: Actor, episodes: Sequence[EvaluationRow]
+  config: RunConfig, actor: Actor, episodes: Sequence[EvaluationRow]
 ) -> list[np.ndarray]:
   """The frames of evaluated episodes, played again."""
-  environment: Any = world.build()
+  environment: Any = config.environment_spec.build()
   frames: list[np.ndarray] = []
   for row in episodes:
     seed = seeding.derive(row.seed, "evaluation", row.episode)
@@ -215,7 +205,7 @@ def _play(
       task_switch.one_task(row.task),
       seed,
       recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
-      max_steps=_MOST_SECONDS * world.control_hz,
+      max_steps=_MOST_SECONDS * config.control_hz,
       until_success_of=row.task,
     )
     frames += clip.frames
@@ -239,5 +229,9 @@ def choose_episodes(
   return sorted(best.values(), key=rank)[:_CLIPS]
 
 
+cli = functools.partial(
+  command.run, main, render=True, define_flags=config_flags.define
+)
+
 if __name__ == "__main__":
-  command.run(main, render=True, define_flags=config_flags.define)
+  cli()

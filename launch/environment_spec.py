@@ -1,44 +1,31 @@
 """Environments by the config's names; importable by worker processes."""
 
 import dataclasses
-import functools
 import importlib
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import dm_env
 
 import lfgp_dmc
-from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.task_names import check_task
 
 
 @dataclasses.dataclass(frozen=True)
 class EnvironmentSpec:
-  """How to build an environment; picklable.
-
-  Attributes:
-    main_task: the task that is loaded.
-    environment: "" for the block tasks, or `package.module:factory`.
-    control_hz: control steps a second of the block tasks: 20, 10 or 5.
-  """
+  """How to build an environment; picklable."""
 
   main_task: str
-  environment: str = ""
-  control_hz: int = 20
+  environment: str = ""  # of the block tasks; or `package.module:factory`
+  control_hz: int = 20  # of the block tasks: 20, 10 or 5
 
   def build(
     self, show_rewards: bool = False, seed: int | None = None
   ) -> dm_env.Environment:
-    """Builds it.
-
-    Args:
-      show_rewards: whether each task's dense reward is observed, for returns.
-      seed: of its starts, where it takes one.
+    """Builds it; `show_rewards` adds each task's dense reward, for returns.
 
     Raises:
-      ValueError: there is no such task, factory or rate; the message says what
-        is.
+      ValueError: there is no such task, factory or rate; lists the valid.
     """
     if self.environment:
       make = _imported(self.environment)
@@ -52,31 +39,12 @@ class EnvironmentSpec:
       show_rewards=show_rewards,
     )
 
-  def factory(
-    self, show_rewards: bool = False
-  ) -> Callable[..., dm_env.Environment]:
-    """A picklable function that builds it, taking `seed=`."""
-    return functools.partial(self.build, show_rewards)
-
   def check(self) -> None:
     """Raises ValueError if `build` would not find what it needs."""
     if self.environment:
       _imported(self.environment)
     else:
       check_task(self.main_task)
-
-
-def tasks_of(environment: dm_env.Environment, main_task: str) -> tuple:
-  """The tasks whose success is observable, `main_task` first."""
-  spec = environment.observation_spec()
-  found = []
-  if isinstance(spec, Mapping):
-    found = [
-      name.removeprefix(SUCCESS_PREFIX)
-      for name in spec
-      if name.startswith(SUCCESS_PREFIX)
-    ]
-  return (main_task, *(task for task in found if task != main_task))
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:

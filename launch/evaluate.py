@@ -7,6 +7,7 @@ Every intention plays whole episodes in the main task's environment, by its
 mean action; the reset of episode i depends on (--seed, i) alone.
 """
 
+import functools
 import pathlib
 from collections.abc import Sequence
 
@@ -22,18 +23,21 @@ from lfgp_dmc.task_names import CONTROL_RATES
 _NAME = "evaluation.csv"
 
 _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
-_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_EXPERT = flags.DEFINE_enum(
+  "expert", None, [policies.SCRIPTED], "Instead of --run."
+)
 _TASKS = flags.DEFINE_string(
   "tasks",
   "",
   "Comma-separated intentions, or all; default: the main task alone.",
 )
-_EPISODES = flags.DEFINE_integer("episodes", 50, "Episodes a task.")
-_SEED = flags.DEFINE_integer("seed", 0, "Of the resets.")
-_WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.")
-_MAIN_TASK = flags.DEFINE_string(
+_EPISODES = flags.DEFINE_integer("episodes", 50, "Episodes a task.", 1)
+_SEED = flags.DEFINE_integer("seed", 0, "Of the resets.", 0)
+_WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.", 0)
+_MAIN_TASK = flags.DEFINE_enum(
   "main_task",
-  "",
+  None,
+  lfgp_dmc.ALL_TASKS,
   "With --expert: whose environment; default: each task in its own.",
 )
 _HERTZ = flags.DEFINE_integer(
@@ -49,15 +53,12 @@ _OUTPUT = flags.DEFINE_string(
 
 def main() -> None:
   """Plays, prints the table, and writes the rows."""
-  command.check_least("episodes", _EPISODES.value, 1)
-  command.check_least("seed", _SEED.value, 0)
-  command.check_least("workers", _WORKERS.value, 0)
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
   rows: list[evaluation_csv.EvaluationRow] = []
   for spec, tasks in _plan():
     rows += evaluation.evaluate(
-      spec.world.factory(show_rewards=True),
+      functools.partial(spec.environment_spec.build, True),
       spec.make,
       tasks,
       _EPISODES.value,
@@ -76,31 +77,19 @@ def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
   if _RUN.value or not _EXPERT.value:
     spec = policies.find(_RUN.value, _EXPERT.value)
     return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
-  command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
-  own = _MAIN_TASK.value
-  if own:
-    command.check_choice("main_task", own, lfgp_dmc.ALL_TASKS)
-  default = own or lfgp_dmc.MAIN_TASKS[0]
-  tasks = choose_tasks(
-    _TASKS.value, lfgp_dmc.task_set(own) if own else lfgp_dmc.ALL_TASKS, default
+  expert = functools.partial(
+    policies.find, "", policies.SCRIPTED, control_hz=_HERTZ.value
   )
-  if own:
-    return [(_scripted(own), tasks)]
-  return [(_scripted(task), (task,)) for task in tasks]
+  if own := _MAIN_TASK.value:
+    return [
+      (expert(task=own), choose_tasks(_TASKS.value, lfgp_dmc.task_set(own)))
+    ]
+  tasks = choose_tasks(_TASKS.value, lfgp_dmc.ALL_TASKS)
+  return [(expert(task=task), (task,)) for task in tasks]
 
 
-def _scripted(task: str) -> policies.PolicySpec:
-  return policies.find("", policies.SCRIPTED, task, _HERTZ.value)
-
-
-def choose_tasks(
-  requested: str, known: tuple[str, ...], default: str = ""
-) -> tuple[str, ...]:
-  """The tasks of `--tasks`.
-
-  Raises:
-    UserError: one that is not known.
-  """
+def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
+  """The tasks of `--tasks`; raises UserError if one is not known."""
   if requested == "all":
     return known
   names = tuple(name.strip() for name in requested.split(",") if name.strip())
@@ -110,15 +99,11 @@ def choose_tasks(
       f"--tasks: unknown {', '.join(unknown)}; valid: all, or some of "
       f"{', '.join(known)}"
     )
-  return tuple(dict.fromkeys(names)) or (default or known[0],)
+  return tuple(dict.fromkeys(names)) or known[:1]
 
 
 def _output() -> pathlib.Path | None:
-  """The file the rows go to; None: only the table is printed.
-
-  Raises:
-    UserError: the file of `--output` exists.
-  """
+  """The file the rows go to; None: only the table is printed."""
   if not _OUTPUT.value:
     return pathlib.Path(_RUN.value) / _NAME if _RUN.value else None
   path = pathlib.Path(_OUTPUT.value) / _NAME
@@ -130,11 +115,7 @@ def _output() -> pathlib.Path | None:
 def add_rows(
   path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
 ) -> None:
-  """Appends the rows that the file does not have; makes it if missing.
-
-  Raises:
-    UserError: the file is no evaluation.
-  """
+  """Appends the rows that the file, an evaluation if it exists, has not."""
   path.parent.mkdir(parents=True, exist_ok=True)
   with command.checked_input():
     known = evaluation_csv.read_csv(path) if path.exists() else []
@@ -142,5 +123,7 @@ def add_rows(
   evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

@@ -11,6 +11,7 @@ its stratified bootstrap interval; a CSV file beside each figure has its
 numbers. --quantity=return draws returns instead of success.
 """
 
+import functools
 import itertools
 import pathlib
 
@@ -76,5 +77,7 @@ def _path(*words: str) -> pathlib.Path:
   return pathlib.Path(_OUTPUT.value) / f"{'_'.join(words)}.{_FORMAT.value}"
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

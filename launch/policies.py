@@ -6,7 +6,6 @@ or torch only when it is called.
 
 import dataclasses
 import functools
-import os
 import pathlib
 from collections.abc import Callable
 from typing import Any
@@ -26,7 +25,7 @@ class PolicySpec:
 
   make: Callable[[], Actor]  # picklable
   name: str  # for tables and sidecars
-  world: EnvironmentSpec
+  environment_spec: EnvironmentSpec
   tasks: tuple[str, ...]  # its intentions, the main task first
   folder: pathlib.Path | None = None  # of a run
   config: dict[str, Any] = dataclasses.field(default_factory=dict)
@@ -35,7 +34,7 @@ class PolicySpec:
   @property
   def main_task(self) -> str:
     """The task of its environment."""
-    return self.world.main_task
+    return self.environment_spec.main_task
 
 
 def scripted_expert(control_hz: int = 20) -> Actor:
@@ -56,15 +55,15 @@ def stored_policy(folder: str) -> Actor:
 
 
 def find(
-  run: str, expert: str, task: str = "", control_hz: int = 20
+  run: str, expert: str | None = None, task: str = "", control_hz: int = 20
 ) -> PolicySpec:
   """The policy that `--run` or `--expert` names.
 
   Args:
     run: a run or policy folder, or "".
-    expert: "scripted", a run folder, or "".
-    task: for the scripted expert, the task whose environment is loaded.
-    control_hz: likewise, its control steps a second.
+    expert: "scripted", or a run folder.
+    task: whose environment the scripted expert gets.
+    control_hz: of the scripted expert.
 
   Raises:
     UserError: none or both are given, or the folder holds no policy.
@@ -78,25 +77,21 @@ def find(
     return PolicySpec(
       make, "scripted expert", EnvironmentSpec(task, "", control_hz), tasks
     )
-  return _of_folder(run or expert)
-
-
-def _of_folder(folder: str) -> PolicySpec:
-  path = pathlib.Path(folder)
+  path = pathlib.Path(run or str(expert))
   try:
     config = run_folder.read_config(path)
-    policy: Any = stored_policy(folder)
+    policy: Any = stored_policy(str(path))
     main_task = config.get("main_task", policy.tasks[0])
-    world = EnvironmentSpec(
+    spec = EnvironmentSpec(
       main_task, config.get("environment", ""), config.get("control_hz", 20)
     )
-    world.check()
+    spec.check()
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
   return PolicySpec(
-    functools.partial(stored_policy, os.fspath(path)),
+    functools.partial(stored_policy, str(path)),
     path.name,
-    world,
+    spec,
     (main_task, *(t for t in policy.tasks if t != main_task)),
     path,
     config,

@@ -32,7 +32,9 @@ from lfgp_dmc.task_names import CONTROL_RATES
 _RUN = flags.DEFINE_string(
   "run", "", "A run's folder, or a policy folder; several for strips."
 )
-_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_EXPERT = flags.DEFINE_enum(
+  "expert", None, [policies.SCRIPTED], "Instead of --run."
+)
 _HERTZ = flags.DEFINE_integer(
   "control_hz", 20, "With --expert: 20, 10 or 5 control steps a second."
 )
@@ -79,9 +81,7 @@ def main() -> None:
   """Plays, renders and writes."""
   rows, columns = _grid()
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
-  if _EXPERT.value:
-    command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
-  elif _COLLECTION.value == "play":
+  if _COLLECTION.value == "play" and not _EXPERT.value:
     raise UserError("--collection=play needs --expert=scripted")
   if _TASK.value and (_EXPERT.value or _WHAT.value == "reset"):
     command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
@@ -144,7 +144,7 @@ def _film_strips(look: recorder.Look) -> None:
     tasks = [_TASK.value] if _TASK.value else lfgp_dmc.MAIN_TASKS
     specs = [policies.find("", _EXPERT.value, task) for task in tasks]
   else:
-    specs = [policies.find(run, "") for run in _RUN.value.split(",")]
+    specs = [policies.find(run) for run in _RUN.value.split(",")]
   output = _output("strips", (".png",))
   seeds = range(_SEED.value, _SEED.value + _ATTEMPTS.value)
   cells, shown = [], []
@@ -189,11 +189,7 @@ def _grid() -> tuple[int, int]:
 def _output(
   stem: str, formats: tuple[str, ...] = video.FORMATS
 ) -> pathlib.Path:
-  """Where the picture goes.
-
-  Raises:
-    UserError: an unknown suffix, or the file exists.
-  """
+  """The path of the picture: a new file of a known format."""
   default = f"videos/{stem}{formats[0]}".replace(" ", "_")
   output = pathlib.Path(_OUTPUT.value or default)
   if output.suffix not in formats:
@@ -205,5 +201,7 @@ def _output(
   return output
 
 
+cli = functools.partial(command.run, main, render=True)
+
 if __name__ == "__main__":
-  command.run(main, render=True)
+  cli()

@@ -7,14 +7,14 @@
 A run is a flagfile with a main task and a seed. Each gets one process with one
 thread; one that dies is resumed from its checkpoint, and what is done is not
 done again, so the same command goes on with a sweep that was stopped. Ctrl-C
-lets the runs write
-their checkpoints. RUNS/index.csv has a row a run, RUNS/NAME.log its output.
-With --ray_address=auto the runs go to a Ray cluster instead (`ray start` on
-each machine). Its nodes share this folder and have the same Python environment;
-a run whose node is lost is resumed on another.
+lets the runs write their checkpoints. RUNS/index.csv has a row a run,
+RUNS/NAME.log its output. With --ray_address=auto the runs go to a Ray cluster
+instead (`ray start` on each machine). Its nodes share this folder and have the
+same Python environment; a run whose node is lost is resumed on another.
 """
 
 import collections
+import functools
 import pathlib
 import signal
 import time
@@ -81,7 +81,12 @@ def main() -> int:
     raise UserError("none of these runs has a flagfile; see --dry_run")
   runs.mkdir(parents=True, exist_ok=True)
   sweep = Sweep(jobs, runs / sweep_jobs.INDEX_NAME, _RESTARTS.value)
-  was_stopped = sweep.run(_engine())
+  engine: sweep_engines.Engine
+  if _RAY_ADDRESS.value:
+    engine = sweep_engines.RayEngine(_RAY_ADDRESS.value, _WORKERS.value)
+  else:
+    engine = sweep_engines.LocalEngine(_WORKERS.value or command.cores())
+  was_stopped = sweep.run(engine)
   print(f"{_summary(jobs)}\n{runs / sweep_jobs.INDEX_NAME}")
   if was_stopped:
     return command.INTERRUPTED
@@ -105,12 +110,6 @@ def _jobs(runs: pathlib.Path) -> list[Job]:
     )
     sweep_jobs.chain(jobs, _STARTS.value)
   return jobs
-
-
-def _engine() -> sweep_engines.Engine:
-  if _RAY_ADDRESS.value:
-    return sweep_engines.RayEngine(_RAY_ADDRESS.value, _WORKERS.value)
-  return sweep_engines.LocalEngine(_WORKERS.value or command.cores())
 
 
 def _summary(jobs: Sequence[Job]) -> str:
@@ -147,7 +146,11 @@ class Sweep:
           if changed or time.monotonic() - written > _INDEX_EVERY:
             sweep_jobs.write_index(self._jobs, self._index)
             written = time.monotonic()
-          if not self._started and (stop or not self._is_any_resting()):
+          is_any_resting = any(
+            job.state == sweep_jobs.WAITING and job.attempts
+            for job in self._jobs
+          )
+          if not self._started and (stop or not is_any_resting):
             return bool(stop)
           time.sleep(_POLL)
       except KeyboardInterrupt:  # the second request
@@ -171,11 +174,6 @@ class Sweep:
       self._started[job.name] = time.monotonic()
       print(f"started {job.name} (attempt {job.attempts})", flush=True)
     return len(self._started) > before
-
-  def _is_any_resting(self) -> bool:
-    return any(
-      job.state == sweep_jobs.WAITING and job.attempts for job in self._jobs
-    )
 
   def _may_start(self, job: Job) -> bool:
     if time.monotonic() < self._rests_until.get(job.name, 0.0):
@@ -230,5 +228,7 @@ def _last_words(log: pathlib.Path, status: int) -> tuple[str, bool]:
   return message, is_reported
 
 
+cli = functools.partial(command.run, main)
+
 if __name__ == "__main__":
-  command.run(main)
+  cli()

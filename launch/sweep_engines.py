@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from absl import logging
 
@@ -28,39 +28,21 @@ _VARIABLES = {
 }
 
 
-class Engine(Protocol):
-  """Starts runs and reports their ends."""
-
-  @property
-  def slots(self) -> int:
-    """Number of runs at a time; may change."""
-
-  def start(self, name: str, arguments: Sequence[str], log: pathlib.Path):
-    """Starts `launch/train.py`; its output is appended to `log`."""
-
-  def ended(self) -> Mapping[str, int]:
-    """Name -> exit status of the runs that ended since the last call."""
-
-  def interrupt(self) -> None:
-    """Requests a checkpoint and the end of all runs."""
-
-  def kill(self) -> None:
-    """Ends all runs at once."""
-
-
 class LocalEngine:
-  """One process a run on this machine."""
+  """One process a run on this machine; at most `slots` at a time."""
 
   def __init__(self, slots: int):
     self.slots = slots
     self._running: dict[str, subprocess.Popen] = {}
 
-  def start(self, name, arguments, log) -> None:
-    """See `Engine`."""
+  def start(
+    self, name: str, arguments: Sequence[str], log: pathlib.Path
+  ) -> None:
+    """Starts `launch/train.py`; its output is appended to `log`."""
     self._running[name] = popen(arguments, log)
 
   def ended(self) -> Mapping[str, int]:
-    """See `Engine`."""
+    """Name -> exit status of the runs that ended since the last call."""
     over = {
       name: status
       for name, process in self._running.items()
@@ -71,12 +53,12 @@ class LocalEngine:
     return over
 
   def interrupt(self) -> None:
-    """See `Engine`."""
+    """Requests a checkpoint and the end of all runs."""
     for process in self._running.values():
       process.terminate()
 
   def kill(self) -> None:
-    """See `Engine`."""
+    """Ends all runs at once."""
     for process in self._running.values():
       os.killpg(process.pid, signal.SIGKILL)
 
@@ -88,11 +70,7 @@ class RayEngine:
   """
 
   def __init__(self, address: str, slots: int = 0):
-    """Connects.
-
-    Args:
-      address: of the cluster, such as auto.
-      slots: runs at a time; 0: as many as the cluster has cores.
+    """Connects; `slots` 0: as many runs as the cluster has cores.
 
     Raises:
       UserError: Ray is not installed, or there is no such cluster.
@@ -113,17 +91,17 @@ class RayEngine:
 
   @property
   def slots(self) -> int:
-    """See `Engine`; follows the nodes that join and leave."""
+    """See `LocalEngine`; follows the nodes that join and leave."""
     cores = self._ray.cluster_resources().get("CPU", 0)
     return self._slots or max(1, int(cores))
 
   def start(self, name, arguments, log) -> None:
-    """See `Engine`."""
+    """See `LocalEngine`."""
     run = self._make_run.remote(os.getcwd(), arguments, log)
     self._running[name] = run, run.wait.remote()
 
   def ended(self) -> Mapping[str, int]:
-    """See `Engine`; a run that is lost with its node counts as killed."""
+    """See `LocalEngine`; a run that is lost with its node counts as killed."""
     over = {}
     for name, (_, status) in list(self._running.items()):
       if not self._ray.wait([status], timeout=0)[0]:
@@ -137,12 +115,12 @@ class RayEngine:
     return over
 
   def interrupt(self) -> None:
-    """See `Engine`."""
+    """See `LocalEngine`."""
     for run, _ in self._running.values():
       run.terminate.remote()
 
   def kill(self) -> None:
-    """See `Engine`."""
+    """See `LocalEngine`."""
     self._ray.shutdown()
 
 
@@ -165,17 +143,16 @@ class _RayRun:
     self._process.terminate()
 
 
+Engine = LocalEngine | RayEngine
+
+
 def popen(
   arguments: Sequence[str], log: pathlib.Path, place: str = platform.node()
 ) -> subprocess.Popen:
   """Starts `launch/train.py` in a process group of its own.
 
-  Signals of the terminal do not reach it: the sweep passes one on, once.
-
-  Args:
-    arguments: of `launch/train.py`.
-    log: gets the command, the place and the output at its end.
-    place: name of this machine.
+  Signals of the terminal do not reach it: the sweep passes one on, once. The
+  log gets the command, the place and the output.
   """
   log.parent.mkdir(parents=True, exist_ok=True)
   with open(log, "a", encoding="utf-8") as output:
@@ -183,15 +160,9 @@ def popen(
     lead = "\n" if output.tell() else ""
     output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
     output.flush()
+    python, starter = sys.executable, str(os.getpid())
     return subprocess.Popen(
-      [
-        sys.executable,
-        str(_CHILD),
-        str(os.getpid()),
-        sys.executable,
-        str(_TRAIN),
-        *arguments,
-      ],
+      [python, str(_CHILD), starter, python, str(_TRAIN), *arguments],
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,

@@ -6,10 +6,9 @@ A run is named after its flagfile, main task and seed: `lfgp_stack_0` is
 
 import csv
 import dataclasses
+import math
 import pathlib
 from collections.abc import Iterable, Sequence
-
-import numpy as np
 
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.runs import run_folder
@@ -81,12 +80,8 @@ def make_jobs(
     main_tasks: of the others.
     seeds: of each.
     runs: folder for the runs.
-    arguments: more of `launch/train.py` for every run; `{runs}` and `{seed}`
-      are filled in.
-    flags: folder of the flagfiles.
-
-  Returns:
-    The jobs; those without a flagfile are in state `MISSING`.
+    arguments: more of `launch/train.py`; `{runs}` and `{seed}` are filled in.
+    flags: folder of the flagfiles; jobs that find none are `MISSING`.
   """
   jobs = []
   for seed in seeds:
@@ -140,9 +135,8 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
       job.after = f"{source}_{job.seed}"
       folder = job.folder.with_name(job.after)
       job.arguments = (*job.arguments, f"--{field}={folder}")
-      if (
-        job.after not in known and not _is_done(folder) and job.state == WAITING
-      ):
+      is_there = job.after in known or _is_done(folder)
+      if job.state == WAITING and not is_there:
         job.state, job.message = HELD, f"{job.after} is not part of the sweep"
 
 
@@ -166,20 +160,13 @@ def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
   rows = []
   for job in jobs:
     step, success = _last_success(job.folder)
+    found = {
+      "env_step": step,
+      "success": success,
+      "wall_s": f"{job.wall_s:.0f}",
+    }
     rows.append(
-      {
-        "name": job.name,
-        "algorithm": job.algorithm,
-        "main_task": job.main_task,
-        "seed": job.seed,
-        "state": job.state,
-        "attempts": job.attempts,
-        "wall_s": f"{job.wall_s:.0f}",
-        "env_step": step,
-        "success": success,
-        "folder": job.folder,
-        "message": job.message,
-      }
+      {k: found[k] if k in found else getattr(job, k) for k in COLUMNS}
     )
   csv_files.write(index, COLUMNS, rows)
 
@@ -197,15 +184,12 @@ def _is_done(folder: pathlib.Path) -> bool:
 def _last_success(folder: pathlib.Path) -> tuple[str, str]:
   """The last evaluation of the main task: its step, and share of successes."""
   try:
-    main_task = run_folder.read_config(folder).get("main_task")
+    main_task = str(run_folder.read_config(folder).get("main_task"))
     rows = evaluation_csv.read_csv(folder / "evaluation.csv")
   except (OSError, ValueError, csv.Error):
     return "", ""
-  rows = [row for row in rows if row.task == main_task]
+  rows = evaluation_csv.newest(row for row in rows if row.task == main_task)
   if not rows:
     return "", ""
-  last = max(row.env_step for row in rows)
-  known = [
-    r.success for r in rows if r.env_step == last and r.success is not None
-  ]
-  return str(last), f"{np.mean(known):.3f}" if known else ""
+  rate = evaluation_csv.success_rates(rows)[main_task]
+  return str(rows[0].env_step), "" if math.isnan(rate) else f"{rate:.3f}"

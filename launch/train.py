@@ -8,6 +8,7 @@ The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
 events, checkpoints/, replay/ and policy.safetensors.
 """
 
+import functools
 import pathlib
 
 from absl import flags
@@ -53,10 +54,7 @@ def report(
   is_supervised = configs.ALGORITHMS[config.algorithm].is_supervised
   unit = "updates" if is_supervised else "environment steps"
   print(f"\nsuccess after {progress.env_step} {unit}:")
-  last = max(row.env_step for row in rows)
-  print(
-    evaluation_csv.success_table([row for row in rows if row.env_step == last])
-  )
+  print(evaluation_csv.success_table(evaluation_csv.newest(rows)))
   print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")
   print(f"evaluation   {path / 'evaluation.csv'}")
   print(f"policy       {path / 'policy.safetensors'}")
@@ -64,11 +62,7 @@ def report(
 
 
 def _config() -> configs.RunConfig:
-  """The config of the flags, or on a bare --resume the run's own.
-
-  Raises:
-    UserError: a wrong value, or --resume without --run.
-  """
+  """The config of the flags, or on a bare --resume the run's own."""
   with command.checked_input():
     if not _RESUME.value:
       return config_flags.resolved()
@@ -83,5 +77,7 @@ def _config() -> configs.RunConfig:
       raise UserError(f"{_RUN.value}/config.json: {error}") from None
 
 
+cli = functools.partial(command.run, main, define_flags=config_flags.define)
+
 if __name__ == "__main__":
-  command.run(main, define_flags=config_flags.define)
+  cli()

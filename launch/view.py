@@ -24,7 +24,9 @@ _TASK = flags.DEFINE_string(
   "task", "", "The task to look at; with --run, the intention that acts."
 )
 _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
-_EXPERT = flags.DEFINE_string("expert", "", "scripted: the scripted expert.")
+_EXPERT = flags.DEFINE_enum(
+  "expert", None, [policies.SCRIPTED], "Instead of --run."
+)
 _SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
 
 
@@ -33,8 +35,6 @@ def main() -> None:
   task, spec = _TASK.value, None
   if task and not _RUN.value:
     command.check_choice("task", task, lfgp_dmc.ALL_TASKS)
-  if _EXPERT.value:
-    command.check_choice("expert", _EXPERT.value, (policies.SCRIPTED,))
   if _RUN.value or _EXPERT.value:
     spec = policies.find(_RUN.value, _EXPERT.value, task)
     task = command.check_choice("task", task or spec.main_task, spec.tasks)
@@ -69,8 +69,8 @@ class _Player:
 def _open(spec: policies.PolicySpec | None, task: str) -> None:
   from dm_control.viewer import application, user_input
 
-  world = spec.world if spec else EnvironmentSpec(task)
-  environment = world.build(seed=_SEED.value)
+  where = spec.environment_spec if spec else EnvironmentSpec(task)
+  environment = where.build(seed=_SEED.value)
   app = application.Application(title=_title(task))
   player = None
   if spec:
@@ -91,5 +91,7 @@ def _title(task: str) -> str:
   return f"LfGP-DMC: {task}"
 
 
+cli = functools.partial(command.run, main, window=True)
+
 if __name__ == "__main__":
-  command.run(main, window=True)
+  cli()

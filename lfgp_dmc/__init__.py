@@ -6,6 +6,11 @@
     timestep = environment.reset()
     action = policy(lfgp_dmc.flatten(timestep.observation))
 
+Names of tasks: `MAIN_TASKS` (4), `AUXILIARY_TASKS` (5), `ALL_TASKS` (both).
+`OBSERVATION_SIZE` is 59 floats; `OBSERVATION_SLICES` says where each component
+is in them, its unit (m, m/s, rad/s, ...; quaternions are w x y z), and whether
+it needs the simulator's state.
+
 This facade reaches `tasks` and `agents` inside its functions only: importing it
 loads neither a simulator nor torch.
 """

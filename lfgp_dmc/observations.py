@@ -73,14 +73,7 @@ _FLAT = np.argsort(_GROUPED)
 
 
 def components(flat: np.ndarray) -> dict[str, np.ndarray]:
-  """Splits the 59 into the named components; the inverse of `flatten`.
-
-  Args:
-    flat: float32 [59], in the order of the released code.
-
-  Returns:
-    Component name -> float32 [size].
-  """
+  """Splits float32 [59] into the named components; the inverse of `flatten`."""
   grouped = flat[_GROUPED]
   return {name: grouped[bounds] for name, bounds in _BOUNDS.items()}
 

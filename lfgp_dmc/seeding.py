@@ -7,11 +7,8 @@ def derive(seed: int, *path: int | str) -> int:
   """A 32-bit seed that depends on `seed` and `path` alone.
 
   Args:
-    seed: the user's seed, 0 or more.
+    seed: the user's, 0 or more.
     *path: what the stream is for, such as ("evaluation", 3).
-
-  Returns:
-    An integer for `numpy.random.default_rng`, `RandomState` or torch.
   """
   words = [seed]
   for part in path:

@@ -27,30 +27,18 @@ def check_task(task: str) -> str:
 
 
 def task_set(main_task: str) -> tuple[str, ...]:
-  """T_all of a main task, the main task first.
+  """T_all of any of the nine tasks, in the order of every K axis.
 
-  Args:
-    main_task: any of the nine tasks. `move_object` (the pre-training task of
-      the paper's transfers) is learned with open, close, reach and lift; every
-      other auxiliary task stands alone.
-
-  Returns:
-    The names of the tasks learned together, in the order of every K axis.
+  The task itself comes first. `move_object` (the pre-training task of the
+  paper's transfers) is learned with open, close, reach and lift; every other
+  auxiliary task stands alone.
   """
   check_task(main_task)
+  gripper, rest = AUXILIARY_TASKS[:2], AUXILIARY_TASKS[2:]
   if main_task == "insert":
-    auxiliary: tuple[str, ...] = (
-      "open_gripper",
-      "close_gripper",
-      "bring",
-      "reach",
-      "lift",
-      "move_object",
-    )
-  elif main_task in MAIN_TASKS:
-    auxiliary = AUXILIARY_TASKS
-  elif main_task == "move_object":
-    auxiliary = ("open_gripper", "close_gripper", "reach", "lift")
-  else:
-    auxiliary = ()
-  return (main_task, *auxiliary)
+    return (main_task, *gripper, "bring", *rest)
+  if main_task in MAIN_TASKS:
+    return (main_task, *AUXILIARY_TASKS)
+  if main_task == "move_object":
+    return (main_task, *AUXILIARY_TASKS[:-1])
+  return (main_task,)

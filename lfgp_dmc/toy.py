@@ -21,12 +21,10 @@ class PointEnvironment(dm_env.Environment):
   """Task "right" is done within 0.2 m of x = 0.8 m, "left" of x = -0.8 m."""
 
   def __init__(self, seed: int = 0, fail_every: int = 0):
-    """Makes the environment.
+    """Makes the environment, whose starts the seed fixes.
 
-    Args:
-      seed: fixes the starts.
-      fail_every: each so many episodes the physics "fails" half way: LAST
-        with discount 0, as Composer does; 0 never.
+    Each `fail_every` episodes the physics "fails" half way: LAST with discount
+    0, as Composer does.
     """
     self._random = seeding.generator(seed, "toy")
     self._fail_every = fail_every

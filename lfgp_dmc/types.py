@@ -68,13 +68,7 @@ class Agent(Protocol):
   def save_policy(
     self, folder: files.Path, config: Mapping[str, Any], env_step: int
   ) -> None:
-    """Makes a folder the policy folder of the present policy.
-
-    Args:
-      folder: gets `policy.safetensors` and `config.json`.
-      config: what else `config.json` holds.
-      env_step: how long the agent was trained.
-    """
+    """Writes `policy.safetensors` and `config.json`, which adds to `config`."""
 
   def state_dict(self) -> dict[str, Any]:
     """Arrays and JSON-able values: everything a resume needs but the replay."""

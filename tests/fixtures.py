@@ -6,6 +6,7 @@ import numpy as np
 from absl.testing import parameterized
 
 from lfgp_dmc import toy
+from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.demonstrations import Demonstrations
 
 ATTRIBUTES = {
@@ -42,6 +43,15 @@ def demonstrations(*lengths: int) -> Demonstrations:
     is_last,
     ATTRIBUTES,
   )
+
+
+_RATES = ("wall_s", "steps_per_s", "updates_per_s")
+
+
+def rows(path: pathlib.Path) -> list[dict[str, str]]:
+  """A run's CSV file without what depends on the clock."""
+  _, found = csv_files.read(path)
+  return [{k: v for k, v in row.items() if k not in _RATES} for row in found]
 
 
 class ToyAgent:

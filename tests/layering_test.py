@@ -5,7 +5,7 @@ import pathlib
 import subprocess
 import sys
 
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 _ROOT = pathlib.Path(__file__).resolve().parents[1]
 _FACADE = pathlib.Path("lfgp_dmc/__init__.py")
@@ -99,7 +99,3 @@ class LayeringTest(parameterized.TestCase):
       eager, _ = _imports(path.read_text())
       with self.subTest(path.name):
         self.assertEmpty(eager & {"tasks", *_SIMULATOR})
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -79,7 +79,3 @@ class PackagingTest(absltest.TestCase):
       text=True,
       env={**os.environ, **(environment or {})},
     )
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -12,11 +12,7 @@ _RESETS = 20
 
 
 def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
-  """Measures on one core, on Stack.
-
-  Args:
-    steps: control steps of each measurement.
-    seed: of resets and actions.
+  """Measures on one core, on Stack, for `steps` control steps each time.
 
   Yields:
     `control_steps_per_s`: through the dm_env interface with uniform random

@@ -11,8 +11,9 @@ import torch
 from lfgp_dmc import observations, task_names
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp import LfgpConfig
-from lfgp_dmc.agents.lfgp.config import PretrainingConfig
-from lfgp_dmc.launch.benchmarks.operations import gflop_of_update
+from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, PretrainingConfig
+from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
 _ACTION_SIZE = 4
@@ -27,19 +28,17 @@ _DTYPES = {"fp32": torch.float32, "bf16": torch.bfloat16}
 def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
   """Measures updates and matrix products, in fp32 and bf16, 1 and 2 threads.
 
-  Args:
-    config: whose agent; data are made up.
-    seconds: about how long each measurement takes.
+  Each measurement takes about `seconds`.
 
   Yields:
-    `gflop/<term>` and their sum `gflop_per_update` (see `operations.py`);
+    `gflop/<term>` and their sum `gflop_per_update` (see `_gflop_of_update`);
     `updates_per_s_fp32_1thread` and so on, medians over rounds;
     `matmul_gflops_...`; `roofline_fraction_...`: the first times the second
     over the third, median of the rounds' own; `share_<part>_...`: of the time.
   """
   tasks = tasks_of(config)
   assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
-  terms = gflop_of_update(
+  terms = _gflop_of_update(
     config.agent, len(tasks), observations.OBSERVATION_SIZE, _ACTION_SIZE
   )
   for name, value in terms.items():
@@ -50,7 +49,7 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     torch.set_num_threads(threads)
     for name, dtype in _DTYPES.items():
       suffix = f"{name}_{threads}thread{'s' if threads > 1 else ''}"
-      agent = make_agent(config, bfloat16=name == "bf16")
+      agent = make_agent(dataclasses.replace(config, bfloat16=name == "bf16"))
       rounds = [
         (rate(agent.update, seconds / _ROUNDS), best_matmul_rate(dtype))
         for _ in range(_ROUNDS)
@@ -64,6 +63,48 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
       )
       for part, share in time_shares(agent, seconds / _ROUNDS).items():
         yield f"share_{part}_{suffix}", share
+
+
+def _gflop_of_update(
+  config: LfgpConfig, tasks: int, observation_size: int, action_size: int
+) -> dict[str, float]:
+  """The terms of one update of K tasks, in GFLOP, by a fixed formula.
+
+  What the plain equations ask for, 2 operations a multiply-add, whatever an
+  implementation does or saves: a backward pass costs twice its forward pass (an
+  input gradient alone once), and the gradient penalty, itself differentiated
+  twice, six times its forward pass.
+  """
+  hidden, rows = config.networks.hidden_size, config.batch_size
+  shared = observation_size * hidden + hidden * hidden
+  if config.networks.layout == layouts.SEPARATE:
+    trunk, before = 0, shared  # each head has these layers itself
+  else:
+    trunk, before = shared, hidden * hidden
+  intention = before + hidden * 2 * action_size
+  critic = before + action_size * hidden + hidden
+
+  def gflop(multiplications: float, count: int) -> float:
+    return 2e-9 * multiplications * count
+
+  terms = {
+    "trunk": gflop(trunk, 3 * rows),
+    "trunk_next": gflop(trunk, 2 * rows),
+    "intentions_next": gflop(intention, tasks * rows),
+    "target_critics": gflop(critic, 2 * tasks * rows),
+    "critics": gflop(critic, 3 * 2 * tasks * rows),
+    "intentions": gflop(intention, 3 * tasks * rows),
+    "critics_of_intentions": gflop(critic, 2 * 2 * tasks * rows),
+  }
+  if isinstance(config.reward, DiscriminatorReward):
+    seen = observation_size
+    if config.reward.input == "state_action":
+      seen += action_size
+    discriminator = seen * hidden + hidden * hidden + hidden * tasks
+    mixed = tasks * config.reward.batch_size
+    terms["discriminator"] = gflop(discriminator, 3 * (rows + mixed))
+    terms["gradient_penalty"] = gflop(discriminator, 6 * mixed)
+  return terms
 
 
 def best_matmul_rate(dtype: torch.dtype) -> float:
@@ -85,14 +126,8 @@ def tasks_of(config: RunConfig) -> tuple[str, ...]:
   return (config.main_task,)
 
 
-def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
-  """The config's agent on made-up demonstrations.
-
-  Args:
-    config: a run's; without its pretraining.
-    replay: where its transitions are; None makes some up.
-    bfloat16: overrides the config's.
-  """
+def make_agent(config: RunConfig, replay: Replay | None = None):
+  """The config's agent, without pretraining; data that lack are made up."""
   tasks = tasks_of(config)
   assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   size = observations.OBSERVATION_SIZE
@@ -109,7 +144,7 @@ def make_agent(config: RunConfig, replay=None, bfloat16: bool | None = None):
     torch.device("cpu"),
     size,
     _ACTION_SIZE,
-    bfloat16=config.bfloat16 if bfloat16 is None else bfloat16,
+    bfloat16=config.bfloat16,
   )
 
 

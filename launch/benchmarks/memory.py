@@ -23,10 +23,6 @@ _ASIDE = pathlib.Path("runs")  # git ignores it; a temporary disk may be memory
 def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
   """Fills a replay on disk to its capacity, then makes updates on it.
 
-  Args:
-    config: whose agent, and `replay_capacity`; demonstrations are made up.
-    updates: how many.
-
   Yields:
     `replay_rows`; `resident_gb/<updates so far>`: the process's resident
     memory, mapped pages counted (Linux: VmRSS), before the first update and

@@ -17,15 +17,10 @@ COLUMNS = ("steps", "nan", "warnings", "blocks_out", "max_block_speed")
 def measure(
   tasks: Sequence[str], steps: int, seed: int
 ) -> Iterator[tuple[str, float]]:
-  """Plays uniform random actions.
+  """Plays uniform random actions, `steps` in each task's environment.
 
   In every other episode each is held for ten steps on average, so that the
   hand travels and hits things.
-
-  Args:
-    tasks: in whose environments.
-    steps: control steps a task.
-    seed: of resets and actions.
 
   Yields:
     For each task and then in all: `steps`; `nan` (observations that are not

@@ -25,11 +25,8 @@ def measure(
 ) -> Iterator[tuple[str, float]]:
   """Trains for `steps` steps after one episode without updates.
 
-  Args:
-    config: of the run; demonstrations are made up. Its `threads` are not used:
-      the loop gets the number of threads with which the learner is faster.
-    steps: environment steps with updates.
-    seconds: about how long the updates alone are measured, each time.
+  Torch gets the number of threads with which the learner is faster, not the
+  config's. Updates alone are measured for about `seconds`, each time.
 
   Yields:
     `learner_updates_per_s_1thread`, `..._2threads`: of updates alone, before
@@ -76,8 +73,8 @@ def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
   )
   with tempfile.TemporaryDirectory() as folder:
     log = MetricsLog(folder)
-    progress = loop.train(
-      environment, agent, replay, schedule, log, progress=progress
-    )
+    progress = loop.EpisodeRounds(
+      environment, agent, replay, schedule, log, progress
+    ).run()
     log.close()
   return progress

@@ -5,13 +5,12 @@ from lfgp_dmc.launch.configs.presets import PRESETS
 from lfgp_dmc.launch.configs.resolve import (
   KIND,
   fill,
-  flattened,
   from_dict,
   hint,
   make_config,
-  to_run_config,
 )
 from lfgp_dmc.launch.configs.run_config import RunConfig
+from lfgp_dmc.runs.pytree import flattened
 
 __all__ = [
   "ALGORITHMS",
@@ -24,5 +23,4 @@ __all__ = [
   "from_dict",
   "hint",
   "make_config",
-  "to_run_config",
 ]

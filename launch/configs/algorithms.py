@@ -14,7 +14,6 @@ from lfgp_dmc.types import ActingAgent, SupervisedAgent
 class Algorithm:
   """How an algorithm is made from a run's config."""
 
-  summary: str
   agent_config: type[LfgpConfig] | type[BcConfig]
   build: Callable[..., ActingAgent | SupervisedAgent]  # see `lfgp.build`
   # Config fields by dotted name, and groups that presets leave alone.
@@ -24,32 +23,35 @@ class Algorithm:
   is_supervised: bool = False  # without acting; see `runs/supervised.py`
 
 
-_CLONING = {"checkpoint_every": 5_000}  # updates; its checkpoints are small
+_LFGP = Algorithm(LfgpConfig, lfgp.build)
+# The main task alone. `checkpoint_every` is in updates; checkpoints are small.
+_BC = Algorithm(
+  BcConfig,
+  bc.build,
+  {"checkpoint_every": 5_000, "agent.networks.layout": "separate"},
+  is_multitask=False,
+  is_supervised=True,
+)
 
 ALGORITHMS: dict[str, Algorithm] = {
-  "lfgp": Algorithm(
-    "Learning from Guided Play with a learned scheduler",
-    LfgpConfig,
-    lfgp.build,
+  "lfgp": _LFGP,
+  # Without a scheduler: only the main intention acts.
+  "lfgp_ns": dataclasses.replace(
+    _LFGP, defaults={"agent.scheduler.kind": "main_only"}
   ),
-  "lfgp_ns": Algorithm(
-    "the same without a scheduler: only the main intention acts",
-    LfgpConfig,
-    lfgp.build,
-    {"agent.scheduler.kind": "main_only"},
-  ),
-  "dac": Algorithm(
-    "Discriminator-Actor-Critic: the main task alone, separate networks",
-    LfgpConfig,
-    lfgp.build,
-    {"agent.scheduler.kind": "main_only", "agent.networks.layout": "separate"},
+  # Discriminator-Actor-Critic: the main task alone.
+  "dac": dataclasses.replace(
+    _LFGP,
+    defaults={
+      "agent.scheduler.kind": "main_only",
+      "agent.networks.layout": "separate",
+    },
     is_multitask=False,
   ),
-  "sacx": Algorithm(
-    "SAC-X on the dense rewards of all tasks: the paper's experts",
-    LfgpConfig,
-    lfgp.build,
-    {
+  # SAC-X on the dense rewards of all tasks: the paper's experts.
+  "sacx": dataclasses.replace(
+    _LFGP,
+    defaults={
       "agent.reward.kind": "stored",
       "agent.scheduler.kind": "conditional_weighted",
       "random_steps": 0,
@@ -57,27 +59,14 @@ ALGORITHMS: dict[str, Algorithm] = {
     },
     without=("inputs", "pretraining", "prior"),  # which take demonstrations
   ),
-  "bc": Algorithm(
-    "behaviour cloning of the main task alone",
-    BcConfig,
-    bc.build,
-    {**_CLONING, "agent.networks.layout": "separate"},
-    is_multitask=False,
-    is_supervised=True,
+  "bc": _BC,
+  # As many pairs of the main task as a multitask method has.
+  "bc_less": dataclasses.replace(
+    _BC, defaults={**_BC.defaults, "pairs_per_task": 9000}
   ),
-  "bc_less": Algorithm(
-    "the same with less data: a multitask method's pairs of the main task",
-    BcConfig,
-    bc.build,
-    {**_CLONING, "agent.networks.layout": "separate", "pairs_per_task": 9000},
-    is_multitask=False,
-    is_supervised=True,
-  ),
-  "multitask_bc": Algorithm(
-    "behaviour cloning of all tasks, with a shared trunk",
-    BcConfig,
-    bc.build,
-    {**_CLONING, "agent.networks.layout": "shared_trunk"},
-    is_supervised=True,
+  "multitask_bc": dataclasses.replace(
+    _BC,
+    defaults={**_BC.defaults, "agent.networks.layout": "shared_trunk"},
+    is_multitask=True,
   ),
 }

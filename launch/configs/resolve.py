@@ -2,7 +2,7 @@
 
 import dataclasses
 import difflib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
 
 import ml_collections
@@ -14,6 +14,7 @@ from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.launch.configs.algorithms import ALGORITHMS
 from lfgp_dmc.launch.configs.presets import OF_TASK, PRESETS
 from lfgp_dmc.launch.configs.run_config import RunConfig
+from lfgp_dmc.runs.pytree import flattened
 
 KIND = ".kind"  # the end of names of fields that choose a group's class
 
@@ -37,9 +38,9 @@ def make_config(
   """All fields of a run with their defaults, locked.
 
   Args:
-    algorithm: a name in `ALGORITHMS`; it decides the fields of `agent`.
-    preset: a name in `PRESETS`.
-    main_task: some presets differ by it.
+    algorithm: decides the fields of `agent`.
+    preset: changes defaults, some by the main task.
+    main_task: as above.
     kinds: such as {"agent.scheduler.kind": "uniform"}; they decide the fields
       of their groups.
 
@@ -78,17 +79,8 @@ def make_config(
   return config
 
 
-def to_run_config(config: ml_collections.ConfigDict) -> RunConfig:
-  """Checks a config and freezes it.
-
-  Raises:
-    ValueError: a value out of its range; one line a fault.
-  """
-  return from_dict(config.to_dict())
-
-
 def from_dict(values: Mapping[str, Any]) -> RunConfig:
-  """Reads a config back from nested values, such as a run's `config.json`.
+  """Checks and freezes nested values, such as those of a `config.json`.
 
   A field that is not there, since the run is older than it, has its default.
   In paths, {main_task} and {source_task} (of a transfer) are filled in.
@@ -144,17 +136,6 @@ def fill(path: Any, config: Mapping[str, Any]) -> Any:
       f"{', '.join(SOURCE_TASKS)}"
     )
   return path.replace("{source_task}", SOURCE_TASKS.get(task, ""))
-
-
-def flattened(
-  values: Mapping[str, Any], prefix: str = ""
-) -> Iterator[tuple[str, Any]]:
-  """Dotted names and values of all leaves."""
-  for name, value in values.items():
-    if isinstance(value, Mapping):
-      yield from flattened(value, f"{prefix}{name}.")
-    else:
-      yield prefix + name, value
 
 
 def hint(name: str, known: Iterable[str], prefix: str = "config.") -> str:

@@ -115,7 +115,7 @@ class RunConfig:
       )
 
   @property
-  def world(self) -> EnvironmentSpec:
+  def environment_spec(self) -> EnvironmentSpec:
     """Where the agent acts."""
     return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
 
@@ -123,16 +123,6 @@ class RunConfig:
   def most_episode_steps(self) -> int:
     """Steps of an episode, at most."""
     return self.episode_steps or EPISODE_SECONDS * self.control_hz
-
-  @property
-  def uses_demonstrations(self) -> bool:
-    """Whether the agent learns from demonstrations at all."""
-    return self.agent.uses_demonstrations
-
-  @property
-  def keeps_rewards(self) -> bool:
-    """Whether the replay keeps dense rewards, and so the world shows them."""
-    return self.agent.keeps_rewards
 
   def to_dict(self) -> dict[str, Any]:
     """What `config.json` holds; `configs.from_dict` reads it back."""

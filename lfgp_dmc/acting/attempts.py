@@ -33,30 +33,19 @@ Job = tuple[str | None, Sequence[int]]
 
 @dataclass(frozen=True)
 class CollectionPlan:
-  """What is collected, and how; picklable.
+  """What is collected, and how; picklable."""
 
-  Attributes:
-    make_environment: task -> its environment, with `reseed`, `clear_success`
-      and the observables `success/<task>`.
-    make_actor: the expert.
-    main_task: whose T_all it is.
-    tasks: T_all, the main task first.
-    seed: everything random follows from it.
-    control_hz: control steps a second.
-    play_steps: steps at 20 Hz between resets in play-based collection.
-    limits: task -> most steps at 20 Hz of an attempt, where not `LIMIT`.
-    keep_longest_of: the longest of so many reset-based attempts is kept: hard
-      starts are over-sampled.
-  """
-
+  # Task -> its environment, with `reseed`, `clear_success` and the observables
+  # `success/<task>`.
   make_environment: Callable[[str], dm_env.Environment]
-  make_actor: Callable[[], Actor]
+  make_actor: Callable[[], Actor]  # the expert
   main_task: str
-  tasks: tuple[str, ...]
-  seed: int
+  tasks: tuple[str, ...]  # T_all, the main task first
+  seed: int  # everything random follows from it
   control_hz: int = 20
-  play_steps: int = 360
+  play_steps: int = 360  # at 20 Hz, between resets in play-based collection
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
+  # Of so many reset-based attempts the longest: hard starts are over-sampled.
   keep_longest_of: int = 1
 
   def steps(self, at_20_hz: int) -> int:
@@ -181,8 +170,7 @@ class Collector:
   ) -> tuple[dm_env.TimeStep, bool]:
     """Steps until success (if `stop`), the limit or the episode's end.
 
-    Returns:
-      The last timestep, and whether the task has succeeded.
+    Returns the last timestep, and whether the task has succeeded.
     """
     success = False
     played = rollout.steps(self._environment, timestep, self._actor.act)

@@ -52,16 +52,13 @@ def collect(
   Args:
     plan: environments, actor, T_all and seed.
     collection: "reset" or "play".
-    tasks: which tasks of T_all to keep the pairs of.
+    tasks: of T_all, those whose pairs are kept.
     pairs: N, pairs a task; the last attempt is cut there, and its rows then
       have no `is_last`.
-    workers: processes.
+    workers: processes; the pairs are the same with any number.
     progress: whether to show a progress bar.
     finals: extra pairs a task, each the row of success of a further attempt
       and an episode of its own (the authors' later journal version).
-
-  Returns:
-    Task -> its pairs; the same whatever the number of workers.
 
   Raises:
     ValueError: an unknown collection or task.

@@ -70,28 +70,19 @@ def reseeded(
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
   """The sizes (O, A) of flat observations and of actions."""
-  spec = environment.observation_spec()
-  flatten = flattener(environment)
+  spec: Any = environment.observation_spec()
   if isinstance(spec, Mapping):
-    example: Any = {
-      name: np.zeros(part.shape, part.dtype) for name, part in spec.items()
-    }
+    example: Any = {name: np.zeros(part.shape) for name, part in spec.items()}
   else:
-    example = np.zeros(spec.shape, spec.dtype)
+    example = np.zeros(spec.shape)
   action_size = int(np.prod(environment.action_spec().shape))
-  return len(flatten(example)), action_size
+  return len(flattener(environment)(example)), action_size
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
-  """Each task's reward of this step.
+  """Each task's reward of a step that is not an episode's first, float32 [K].
 
-  Args:
-    timestep: any step but the first of an episode.
-    tasks: K names.
-
-  Returns:
-    float32 [K]: the observable `reward/<task>`, or without one the
-    environment's own reward.
+  It is the observable `reward/<task>`, or else the environment's own reward.
   """
   own = 0.0 if timestep.reward is None else float(timestep.reward)
   observed = timestep.observation
@@ -104,21 +95,14 @@ def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:
   return np.asarray(rewards, np.float32)
 
 
-def tasks_with_rewards(
-  environment: dm_env.Environment, tasks: Sequence[str]
+def with_observed_tasks(
+  environment: dm_env.Environment, tasks: Sequence[str], prefix: str
 ) -> tuple[str, ...]:
-  """`tasks`, then all others whose reward is an observable.
-
-  A replay that keeps all of these can be transferred to any of the tasks.
-  """
+  """`tasks`, then all others that have an observable with the prefix."""
   spec = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
-  shown = [
-    name.removeprefix(observations.REWARD_PREFIX)
-    for name in names
-    if name.startswith(observations.REWARD_PREFIX)
-  ]
-  return (*tasks, *(task for task in shown if task not in tasks))
+  shown = [n.removeprefix(prefix) for n in names if n.startswith(prefix)]
+  return tuple(dict.fromkeys((*tasks, *shown)))
 
 
 def has_succeeded(timestep: dm_env.TimeStep, task: str) -> bool | None:

@@ -34,16 +34,13 @@ def evaluate(
   Args:
     make_environment: builds the main task's environment, which observes
       `reward/<task>` if it can; see `environments.reseeded`.
-    make_actor: builds the actor. With several workers both must be picklable.
+    make_actor: with several workers both must be picklable.
     tasks: the intentions to evaluate.
     episodes: of each task.
     seed: of resets and actors.
     workers: processes; 1 plays in this one.
     progress: whether to show a bar.
-    env_step: goes into the rows.
-
-  Returns:
-    `len(tasks) * episodes` rows, task by task, whatever the workers.
+    env_step: goes into the rows, which come task by task.
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
@@ -64,7 +61,7 @@ def evaluate(
 
 
 class _Player:
-  """An environment and an actor for many episodes."""
+  """Plays whole episodes, one after the other."""
 
   def __init__(self, make_environment, make_actor, seed: int, env_step: int):
     self._make_environment = make_environment

@@ -23,9 +23,6 @@ def steps(
     environment: to play in.
     first: where it is now, such as the time step of its reset.
     choose_action: observation, float32 [O] -> action, float32 [A].
-
-  Yields:
-    Every step, the last one included.
   """
   flatten = environments.flattener(environment)
   timestep, observation = first, flatten(first.observation)

@@ -70,20 +70,16 @@ _state: Callable[[Any], Any] | None = None  # one in each worker process
 
 
 def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
+  """Initialises a worker: it ignores SIGINT and exits with its parent."""
   global _state
-  init_worker()
+  signal.signal(signal.SIGINT, signal.SIG_IGN)
+  threading.Thread(target=_end_with_parent, daemon=True).start()
   _state = make_state()
 
 
 def _work(job: Any) -> Any:
   assert _state is not None
   return _state(job)
-
-
-def init_worker() -> None:
-  """Initialises a worker: ignores SIGINT, exits with its parent."""
-  signal.signal(signal.SIGINT, signal.SIG_IGN)
-  threading.Thread(target=_end_with_parent, daemon=True).start()
 
 
 def _end_with_parent() -> None:

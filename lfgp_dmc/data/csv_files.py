@@ -12,11 +12,7 @@ STEP_COLUMN = "env_step"
 
 
 def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
-  """Reads a CSV file with a header; a torn last line is left out.
-
-  Returns:
-    The columns, and the rows as text; both empty if the file is empty.
-  """
+  """Reads columns and rows, as text; a torn last line is left out."""
   with open(path, newline="", encoding="utf-8") as file:
     text = file.read()
   # A process that is killed while writing leaves a torn last line.

@@ -23,16 +23,7 @@ def of_arrays(
   observation_size: int | None,
   action_size: int | None,
 ) -> list[str]:
-  """Faults of the five arrays.
-
-  Args:
-    arrays: name -> array, as read.
-    observation_size: O of the environment; None accepts any.
-    action_size: A of the environment; None accepts any.
-
-  Returns:
-    One phrase a fault.
-  """
+  """Faults of the five arrays; a size of None accepts any O or A."""
   faults = [f"missing dataset {k!r}" for k in DTYPES if k not in arrays]
   faults += [
     f"{name!r} is {arrays[name].dtype}; valid: {dtype}"

@@ -78,7 +78,7 @@ def write(
 
   Args:
     path: `<dataset>/<task>.hdf5`, in a folder that exists.
-    demonstrations: what to write.
+    demonstrations: of the task.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed`,
       `control_hz`; None takes the demonstrations' own. `schema_version` is
       added.
@@ -112,13 +112,7 @@ def read(
   observation_size: int | None = None,
   action_size: int | None = None,
 ) -> Demonstrations:
-  """Reads and checks one file.
-
-  Args:
-    path: the file.
-    task: expected, like the widths O and A; None accepts any.
-    observation_size: O.
-    action_size: A.
+  """Reads and checks one file, whose task, O and A may be any if None.
 
   Raises:
     DatasetError: it is missing, damaged or breaks the contract; the message
@@ -146,16 +140,7 @@ def read_folder(
   observation_size: int | None = None,
   action_size: int | None = None,
 ) -> dict[str, Demonstrations]:
-  """Reads the files of several tasks, and lists every fault of the folder.
-
-  Args:
-    folder: the dataset folder.
-    tasks: the tasks whose files are needed.
-    observation_size: O; None accepts any.
-    action_size: A; None accepts any.
-
-  Returns:
-    Task -> its demonstrations, in the order of `tasks`.
+  """Reads the files of several tasks, in their order; see `read`.
 
   Raises:
     DatasetError: one line a faulty file, damaged files before missing ones.

@@ -52,6 +52,12 @@ def read_csv(path: files.Path) -> list[EvaluationRow]:
     raise ValueError(f"{path}: {error}") from None
 
 
+def newest(rows: Iterable[EvaluationRow]) -> list[EvaluationRow]:
+  """The rows of the last evaluation."""
+  rows = sorted(rows, key=lambda row: row.env_step)
+  return [row for row in rows if row.env_step == rows[-1].env_step]
+
+
 def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
   """Task -> share of successful episodes; NaN if they cannot be observed."""
   rates = {}
@@ -66,11 +72,7 @@ def success_rates(rows: Sequence[EvaluationRow]) -> dict[str, float]:
 
 
 def success_table(rows: Sequence[EvaluationRow]) -> str:
-  """A plain-text table: success, episodes, mean steps and return per task.
-
-  Args:
-    rows: of one evaluation; pass those of one `env_step`.
-  """
+  """A table of one evaluation: success, episodes, mean steps, mean return."""
   rates = success_rates(rows)
   width = max([16, *(len(task) + 2 for task in rates)])
   lines = [

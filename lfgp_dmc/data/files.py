@@ -14,12 +14,9 @@ Path = str | os.PathLike[str]
 def replacing(path: Path) -> Iterator[pathlib.Path]:
   """Yields a temporary path that becomes `path` if the block succeeds.
 
-  The temporary file lies in the same folder and has the same suffix. If the
+  It lies in the same folder, which must exist, and has the same suffix. If the
   block raises (also KeyboardInterrupt) it is removed, and what was under the
   final name stays untouched.
-
-  Args:
-    path: the final name; its folder must exist.
   """
   final = pathlib.Path(path)
   aside = final.with_name(f".{final.stem}.{os.getpid()}.partial{final.suffix}")

@@ -8,23 +8,10 @@ import numpy as np
 _CHUNK = 16_384  # rows of disk taken at a time
 
 
-def create(path: pathlib.Path, shape: tuple[int, int]) -> np.memmap:
-  """Maps a new file of float32 zeros [size, width]."""
-  path.parent.mkdir(parents=True, exist_ok=True)
-  return np.lib.format.open_memmap(
-    path, mode="w+", dtype=np.float32, shape=shape
-  )
-
-
 def open_rows(
   path: pathlib.Path, shape: tuple[int, int | None], read_only: bool = False
 ) -> np.memmap:
-  """Maps a file that exists.
-
-  Args:
-    path: an npy file.
-    shape: its [size, width]; width None accepts any.
-    read_only: whether it is never written to.
+  """Maps a file of rows [size, width]; width None accepts any.
 
   Raises:
     ValueError: it is missing, damaged or of another shape; names the file.

@@ -23,12 +23,7 @@ _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
 def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
   """Stores one task's demonstrations as a local Minari dataset.
 
-  Args:
-    data: of one task, with its attributes.
-    dataset_id: Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
-
-  Returns:
-    The dataset.
+  The id is Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
 
   Raises:
     ValueError: the id is taken or no id, or an episode's rows do not follow
@@ -66,9 +61,6 @@ def from_minari(
     attributes: `task`, `main_task`, `collection`, `expert`, `seed` and
       `control_hz`, over those that `to_minari` stored.
 
-  Returns:
-    Its pairs; episodes are numbered from 0.
-
   Raises:
     ValueError: there is no such dataset, or its observations or actions are
       not flat floats.
@@ -87,9 +79,13 @@ def from_minari(
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")
+  pairs = [
+    (one.observations[:-1], one.actions, one.observations[1:])
+    for one in episodes
+  ]
   observation, action, after = (
     np.concatenate(parts).astype(np.float32)
-    for parts in zip(*map(_pairs, episodes), strict=True)
+    for parts in zip(*pairs, strict=True)
   )
   lengths = [len(one.actions) for one in episodes]
   return Demonstrations(
@@ -120,10 +116,6 @@ def _buffer(data: Demonstrations, rows: slice) -> EpisodeBuffer:
     terminations=terminations,
     truncations=truncations,
   )
-
-
-def _pairs(episode) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-  return episode.observations[:-1], episode.actions, episode.observations[1:]
 
 
 def _success(episode) -> np.ndarray:

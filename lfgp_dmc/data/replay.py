@@ -91,7 +91,7 @@ class Replay(Ring):
     Raises:
       OSError: the disk is full; the row is not added.
     """
-    row = self._total % self._size
+    row = self.total % self._size
     self._put(row, transition, rewards, 1)
 
   def add_batch(
@@ -100,7 +100,7 @@ class Replay(Ring):
     """Appends B transitions, each field [B, ...], in their order."""
     count = len(transitions.observation)
     skipped = max(0, count - self._size)  # would be overwritten at once
-    numbers = np.arange(self._total + skipped, self._total + count)
+    numbers = np.arange(self.total + skipped, self.total + count)
     kept = Transition(*(part[skipped:] for part in transitions))
     if rewards is not None:
       rewards = rewards[skipped:]
@@ -109,11 +109,7 @@ class Replay(Ring):
   def copy_from(self, source: "Replay") -> int:
     """Adds another replay's transitions, the newest that there is room for.
 
-    Args:
-      source: where its rewards are needed, they are picked by task name.
-
-    Returns:
-      Rows that can be sampled now.
+    Rewards are picked by task name. Returns how many rows can be sampled now.
 
     Raises:
       ValueError: widths differ, or the source keeps no rewards of some task.
@@ -148,13 +144,10 @@ class Replay(Ring):
     return [self.reward_tasks.index(task) for task in tasks]
 
   def gather(self, indices: np.ndarray) -> Transition:
-    """Copies rows out; index 0 is the oldest row, `len(self) - 1` the newest.
+    """Copies rows out: arrays [B, O], [B, A], [B, O].
 
     Args:
-      indices: int [B].
-
-    Returns:
-      A transition of arrays [B, O], [B, A], [B, O].
+      indices: int [B]; 0 is the oldest row, `len(self) - 1` the newest.
     """
     rows = self._rows(indices)
     return Transition(
@@ -176,7 +169,7 @@ class Replay(Ring):
     for mapped in self._mapped:
       mapped.flush()
     description = {
-      "total": self._total,
+      "total": self.total,
       "written": self._written,
       "capacity": self.capacity,
       "size": self._size,
@@ -202,7 +195,8 @@ class Replay(Ring):
       return np.zeros(shape, np.float32)
     path = self._folder / f"{name}.npy"
     if not path.exists() and not (self._folder / SIDECAR).exists():
-      mapped = mapped_rows.create(path, shape)
+      path.parent.mkdir(parents=True, exist_ok=True)
+      mapped = np.lib.format.open_memmap(path, "w+", np.float32, shape)
     else:
       try:
         mapped = mapped_rows.open_rows(path, shape, self._read_only)
@@ -228,7 +222,7 @@ class Replay(Ring):
         f"{path}: a replay of capacity {capacity} (with slack {size}); "
         f"expected {self.capacity} ({self._size})"
       )
-    self._total, self._written = found["total"], found["written"]
+    self.total, self._written = found["total"], found["written"]
 
 
 def _read_sidecar(folder: pathlib.Path) -> dict[str, Any]:

@@ -19,23 +19,18 @@ class Ring:
       raise ValueError(f"capacity {capacity} and slack {slack} must be >= 1, 0")
     self.capacity = capacity
     self._size = capacity + slack
-    self._total = 0  # rows ever added, less those withdrawn
+    self.total = 0  # rows ever added, less those withdrawn; see `rewind`
     self._written = 0  # the most rows ever added: later ones overwrote
     self._low_mark = 0  # the smallest total since it was last requested
 
   def __len__(self) -> int:
     """Rows that can be sampled."""
-    return self._total - self._start
-
-  @property
-  def total(self) -> int:
-    """Rows ever added and not withdrawn: what `rewind` takes."""
-    return self._total
+    return self.total - self._start
 
   @property
   def _start(self) -> int:
     """The number of the oldest row that can be sampled."""
-    return max(0, self._total - self.capacity, self._written - self._size)
+    return max(0, self.total - self.capacity, self._written - self._size)
 
   def withdraw(self, rows: int) -> None:
     """Takes the last `rows` rows back, as if they had never been added.
@@ -44,7 +39,7 @@ class Ring:
     """
     if not 0 <= rows <= len(self):
       raise ValueError(f"cannot withdraw {rows} of {len(self)} rows")
-    self._go_back(self._total - rows)
+    self._go_back(self.total - rows)
 
   def rewind(self, total: int) -> None:
     """Goes back to when `total` rows had been added (a checkpoint).
@@ -53,20 +48,20 @@ class Ring:
       ValueError: those rows are not here, or no longer.
     """
     oldest = max(0, self._written - self._size)
-    if not oldest <= total <= self._total:
+    if not oldest <= total <= self.total:
       raise ValueError(
-        f"the replay holds rows {oldest} to {self._total}; it cannot go back "
+        f"the replay holds rows {oldest} to {self.total}; it cannot go back "
         f"to {total}"
       )
     self._go_back(total)
 
   def clear(self) -> None:
     """Forgets every row."""
-    self._total = self._written = self._low_mark = 0
+    self.total = self._written = self._low_mark = 0
 
   def take_low_mark(self) -> int:
     """The smallest `total` since the last call: rows below have not changed."""
-    mark, self._low_mark = min(self._low_mark, self._total), self._total
+    mark, self._low_mark = min(self._low_mark, self.total), self.total
     return mark
 
   def sample_indices(
@@ -83,9 +78,9 @@ class Ring:
 
   def _add(self, count: int) -> None:
     """Counts new rows."""
-    self._total += count
-    self._written = max(self._written, self._total)
+    self.total += count
+    self._written = max(self._written, self.total)
 
   def _go_back(self, total: int) -> None:
-    self._total = total
+    self.total = total
     self._low_mark = min(self._low_mark, total)

@@ -21,16 +21,11 @@ def row(
 ) -> tuple[list[np.ndarray], int, int]:
   """Searches for a success and shows it, evenly from the reset on.
 
-  Args:
-    play: a function of seed and look, and the limits of `recorder.record`.
-    task: the task to succeed in.
-    seeds: of the episodes to try, in this order.
-    look: how frames are made.
-    columns: frames in the row.
+  `play` is a function of seed and look, and the limits of `recorder.record`.
 
   Returns:
-    The frames, uint8 [height, width, 3]; the seed and the control step of the
-    success.
+    As many frames as columns, uint8 [height, width, 3]; the seed and the
+    control step of the success.
 
   Raises:
     ValueError: no episode succeeded.

@@ -71,7 +71,7 @@ def record(
     first: the reset's time step.
     choose: the task that acts.
     seed: of the actor.
-    look: how frames are made.
+    look: of the frames.
     max_steps: control steps at most; None: the whole episode.
     until_success_of: stop one second after this task's success.
 

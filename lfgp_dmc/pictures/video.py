@@ -64,13 +64,8 @@ def grid(
 ) -> list[np.ndarray]:
   """Plays clips side by side; the shorter ones hold their last frame.
 
-  Args:
-    clips: frames uint8 [height, width, 3], all of one size; at least one each.
-    columns: clips in a row; the last row is filled up with white.
-
-  Returns:
-    Frames uint8 [rows * height, columns * width, 3], as many as the longest
-    clip has.
+  Frames are uint8 [height, width, 3], all of one size. The last row of clips is
+  filled up with white.
   """
   blank = np.full_like(clips[0][0], 255)
   height, width, _ = blank.shape
@@ -87,13 +82,9 @@ def grid(
 def label(
   frame: np.ndarray, left: str, right: str, highlight: bool = False
 ) -> np.ndarray:
-  """Draws captions on a dark or green strip along the top of a frame's copy.
+  """Draws captions on a dark or green (`highlight`) strip along the top.
 
-  Args:
-    frame: uint8 [height, width, 3].
-    left: such as the intention's name.
-    right: such as the step and the success.
-    highlight: whether the strip is green.
+  The frame is uint8 [height, width, 3], and is copied.
   """
   image = Image.fromarray(frame)
   size = max(10, frame.shape[0] // 20)

@@ -43,12 +43,9 @@ def save(
 
   Args:
     folder: the run's `checkpoints/`; made if missing.
-    env_step: environment steps so far; names the checkpoint.
+    env_step: names the checkpoint.
     state: nested dicts and lists of arrays and JSON values (see `pytree.py`).
     run_steps: length of the whole run; None keeps the last three only.
-
-  Returns:
-    The checkpoint's folder.
 
   Raises:
     OSError: it could not be written; the earlier checkpoints are untouched.
@@ -89,14 +86,7 @@ def load(path: files.Path) -> dict[str, Any]:
 
 
 def latest(folder: files.Path) -> pathlib.Path | None:
-  """The newest good checkpoint; damaged ones are named in a warning.
-
-  Args:
-    folder: the run's `checkpoints/`.
-
-  Returns:
-    The checkpoint's folder, or None if there is no good one.
-  """
+  """The newest good checkpoint, if any; damaged ones are named in a warning."""
   for path in reversed(every(folder)):
     try:
       _verify(path)

@@ -17,43 +17,13 @@ from lfgp_dmc import seeding
 from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs.metrics import MetricsLog
-from lfgp_dmc.runs.rounds import CheckpointFn, EvaluateFn, Rounds
+from lfgp_dmc.runs.rounds import Rounds
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 from lfgp_dmc.types import ActingAgent, Episode, Step
 
 
-def train(
-  environment: dm_env.Environment,
-  agent: ActingAgent,
-  replay: Replay,
-  schedule: TrainSchedule,
-  log: MetricsLog,
-  evaluate_fn: EvaluateFn | None = None,
-  checkpoint_fn: CheckpointFn | None = None,
-  *,
-  seed: int = 0,
-  progress: Progress | None = None,
-) -> Progress:
-  """Trains until `schedule.env_steps`, or until SIGINT or SIGTERM.
-
-  Args:
-    environment: any dm_env environment; one with `reseed` has each episode's
-      start fixed by `seed` and the episode's number.
-    agent: acts and learns; it samples from `replay` by itself.
-    replay: where transitions go; with rewards if it keeps them.
-    schedule: when things happen.
-    log: gets the rows.
-    evaluate_fn: see `Rounds.run`, as for `checkpoint_fn` and the result.
-    checkpoint_fn: stores agent, replay and progress.
-    seed: of the episodes' starts and the random actions.
-    progress: of the checkpoint that is being resumed.
-  """
-  loop = _Episodes(environment, agent, replay, schedule, log, seed, progress)
-  return loop.run(evaluate_fn, checkpoint_fn)
-
-
-class _Episodes(Rounds[ActingAgent]):
-  """The state of one call of `train`."""
+class EpisodeRounds(Rounds[ActingAgent]):
+  """Trains an agent that acts, episode by episode."""
 
   def __init__(
     self,
@@ -62,9 +32,21 @@ class _Episodes(Rounds[ActingAgent]):
     replay: Replay,
     schedule: TrainSchedule,
     log: MetricsLog,
-    seed: int,
-    progress: Progress | None,
+    progress: Progress | None = None,
+    seed: int = 0,
   ):
+    """Starts the clock.
+
+    Args:
+      environment: any dm_env environment; one with `reseed` has each episode's
+        start fixed by `seed` and the episode's number.
+      agent: acts and learns; it samples from `replay` by itself.
+      replay: where transitions go; with rewards if it keeps them.
+      schedule: when things happen.
+      log: gets a row each `log_every` steps and a last one.
+      progress: of the checkpoint that is being resumed.
+      seed: of the episodes' starts and the random actions.
+    """
     super().__init__(agent, schedule, log, progress)
     self._environment = environment
     self._replay = replay

@@ -9,35 +9,25 @@ from tensorboard.summary.writer import event_file_writer
 
 from lfgp_dmc.data import csv_files, files
 
-CSV_NAME = "metrics.csv"
-_EVENTS_FOLDER = "tensorboard"
-
 
 class MetricsLog:
   """Appends rows whose columns are fixed by the first one."""
 
   def __init__(self, folder: files.Path):
-    """Opens the log of a run folder, and continues one that exists.
-
-    Args:
-      folder: the run folder; `metrics.csv` and `tensorboard/` go into it.
-    """
-    self._path = pathlib.Path(folder) / CSV_NAME
+    """Opens the log of a run's folder, and continues one that exists."""
+    self._path = pathlib.Path(folder) / "metrics.csv"
     self._columns: list[str] = []
     if self._path.exists():
       self._columns, _ = csv_files.read(self._path)
     self._events = event_file_writer.EventFileWriter(
-      str(self._path.parent / _EVENTS_FOLDER)
+      str(self._path.parent / "tensorboard")
     )
 
   def write(self, row: Mapping[str, float]) -> None:
-    """Appends one row and flushes it.
-
-    Args:
-      row: `env_step` and the metrics by name; a missing one is left empty.
+    """Appends `env_step` and metrics by name; a missing one is left empty.
 
     Raises:
-      ValueError: a column that the first row did not have; names them.
+      ValueError: a column that the first row did not have.
     """
     if csv_files.STEP_COLUMN not in row:
       raise ValueError(f"a metrics row needs {csv_files.STEP_COLUMN!r}")

@@ -4,7 +4,7 @@ Arrays go to one flat dict under names like `critic/optimizer/0`; in the tree
 `{"__array__": name}` keeps their place. Tuples come back as lists.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,13 +14,7 @@ _ITEMS = "__items__"  # a dict whose keys are not all text
 
 
 def pack(state: Any) -> tuple[dict[str, np.ndarray], Any]:
-  """Splits a nested state.
-
-  Args:
-    state: dicts, lists and tuples of arrays, numbers, text, booleans, None.
-
-  Returns:
-    The arrays by flat name, and the JSON-able tree.
+  """Splits a nested state into the arrays by flat name and the JSON tree.
 
   Raises:
     TypeError: a leaf of another type; the message says where.
@@ -44,6 +38,17 @@ def unpack(arrays: Mapping[str, np.ndarray], tree: Any) -> Any:
   if tree.keys() == {_ITEMS}:
     return {key: unpack(arrays, value) for key, value in tree[_ITEMS]}
   return {key: unpack(arrays, value) for key, value in tree.items()}
+
+
+def flattened(
+  values: Mapping[str, Any], prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+  """Dotted names and values of all leaves, such as of a config."""
+  for name, value in values.items():
+    if isinstance(value, Mapping):
+      yield from flattened(value, f"{prefix}{name}.")
+    else:
+      yield prefix + name, value
 
 
 def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:

@@ -32,16 +32,9 @@ class Rounds(abc.ABC, Generic[_Agent]):
     agent: _Agent,
     schedule: TrainSchedule,
     log: MetricsLog,
-    progress: Progress | None,
+    progress: Progress | None = None,
   ):
-    """Starts the clock.
-
-    Args:
-      agent: learns.
-      schedule: when things happen.
-      log: gets a row each `log_every` steps and a last one.
-      progress: of the checkpoint that is being resumed.
-    """
+    """Starts the clock; `progress` is of a checkpoint that is resumed."""
     self.progress = progress or Progress()
     self._agent = agent
     self._schedule = schedule
@@ -50,16 +43,15 @@ class Rounds(abc.ABC, Generic[_Agent]):
     self._mark = self._counts()  # of the last row
 
   def run(
-    self, evaluate_fn: EvaluateFn | None, checkpoint_fn: CheckpointFn | None
+    self,
+    evaluate_fn: EvaluateFn | None = None,
+    checkpoint_fn: CheckpointFn | None = None,
   ) -> Progress:
-    """Trains to the end, or to a signal.
+    """Trains to the end, or to a signal; returns how far it came.
 
     Args:
       evaluate_fn: env_step -> success rate by task; writes its own rows.
       checkpoint_fn: stores the agent, its data and the progress it is given.
-
-    Returns:
-      The progress; `is_complete` tells whether it was stopped.
     """
     schedule, progress = self._schedule, self.progress
     progress.is_complete |= progress.env_step >= schedule.env_steps

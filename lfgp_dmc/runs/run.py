@@ -13,10 +13,13 @@ from absl import logging
 
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.runs import checkpoints, loop, supervised
+from lfgp_dmc.runs import checkpoints
+from lfgp_dmc.runs.loop import EpisodeRounds
 from lfgp_dmc.runs.metrics import MetricsLog
+from lfgp_dmc.runs.rounds import Rounds
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from lfgp_dmc.runs.supervised import EpochRounds
 from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 
@@ -37,7 +40,7 @@ class Run:
     """Opens the log.
 
     Args:
-      folder: the run's, locked.
+      folder: locked.
       agent: freshly built.
       environment: of an acting agent, like `replay` and `seed`.
       replay: opened from the folder.
@@ -57,30 +60,19 @@ class Run:
     self._progress = Progress()
 
   def train(self) -> Progress:
-    """Trains to the end or to a signal; see `loop.train`."""
+    """Trains to the end or to a signal; see `Rounds`."""
     self._save_policy(self._progress.env_step)
-    try:
-      if isinstance(self.agent, SupervisedAgent):
-        return supervised.train(
-          self.agent,
-          self._schedule,
-          self._log,
-          self._evaluate,
-          self._checkpoint,
-          progress=self._progress,
-        )
+    shared = self._schedule, self._log, self._progress
+    rounds: Rounds
+    if isinstance(self.agent, SupervisedAgent):
+      rounds = EpochRounds(self.agent, *shared)
+    else:
       assert self.replay is not None, "an acting agent has a replay"
-      return loop.train(
-        self._environment,
-        self.agent,
-        self.replay,
-        self._schedule,
-        self._log,
-        self._evaluate,
-        self._checkpoint,
-        seed=self._seed,
-        progress=self._progress,
+      rounds = EpisodeRounds(
+        self._environment, self.agent, self.replay, *shared, self._seed
       )
+    try:
+      return rounds.run(self._evaluate, self._checkpoint)
     finally:
       self._log.close()
       self._environment.close()
@@ -90,9 +82,7 @@ class Run:
 
     The CSV files are cut back to it. A replay that lost the checkpoint's rows
     is emptied, with a warning, and the loop refills it before it updates again.
-
-    Returns:
-      Whether there was one.
+    Returns whether there was a checkpoint.
 
     Raises:
       CheckpointError: there are checkpoints, all damaged; nothing was changed.

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from lfgp_dmc.data import files
+from lfgp_dmc.runs import pytree
 
 CONFIG_NAME = "config.json"
 ARRAYS_NAME = "policy.safetensors"
@@ -60,11 +61,7 @@ def default_path(
 
 
 def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
-  """Makes a new run's folder, writes its config, and locks it.
-
-  Args:
-    path: the folder to make; its parents are made too.
-    config: the resolved config, JSON-able.
+  """Makes a new run's folder, and its parents, writes its config, locks it.
 
   Raises:
     ValueError: the folder exists.
@@ -90,8 +87,8 @@ def resume(
   """Opens an existing run's folder and locks it.
 
   Args:
-    path: the run's folder.
-    config: the resolved config of the command; it must equal the run's own.
+    path: of the run.
+    config: of the command; it must equal the run's own.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
@@ -138,24 +135,17 @@ def _differing_fields(
   known: Mapping[str, Any], given: Mapping[str, Any]
 ) -> list[str]:
   """What differs between two configs: `agent.xi (45, now 90)`, ..."""
-  first, second = _leaves(known), _leaves(given)
+  # As JSON, so that tuples equal lists.
+  first, second = (
+    {name: json.dumps(value) for name, value in pytree.flattened(config)}
+    for config in (known, given)
+  )
   names = [*first, *(name for name in second if name not in first)]
   return [
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names
     if first.get(name) != second.get(name)
   ]
-
-
-def _leaves(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-  """Dotted name -> the value as JSON, so that tuples equal lists."""
-  leaves = {}
-  for name, value in config.items():
-    if isinstance(value, Mapping) and value:
-      leaves.update(_leaves(value, f"{prefix}{name}."))
-    else:
-      leaves[f"{prefix}{name}"] = json.dumps(value)
-  return leaves
 
 
 def _locked(path: pathlib.Path):

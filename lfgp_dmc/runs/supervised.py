@@ -4,30 +4,12 @@ There are no environment steps: `env_step` in rows and file names is the number
 of updates, so that the files of all runs read alike.
 """
 
-from lfgp_dmc.runs.metrics import MetricsLog
-from lfgp_dmc.runs.rounds import CheckpointFn, EvaluateFn, Rounds
-from lfgp_dmc.runs.schedule import Progress, TrainSchedule
+from lfgp_dmc.runs.rounds import Rounds
 from lfgp_dmc.types import Metrics, SupervisedAgent
 
 
-def train(
-  agent: SupervisedAgent,
-  schedule: TrainSchedule,
-  log: MetricsLog,
-  evaluate_fn: EvaluateFn | None = None,
-  checkpoint_fn: CheckpointFn | None = None,
-  *,
-  progress: Progress | None = None,
-) -> Progress:
-  """Trains until the agent converges, at most `schedule.env_steps` updates.
-
-  See `Rounds` for the arguments.
-  """
-  return _Epochs(agent, schedule, log, progress).run(evaluate_fn, checkpoint_fn)
-
-
-class _Epochs(Rounds[SupervisedAgent]):
-  """The state of one call of `train`."""
+class EpochRounds(Rounds[SupervisedAgent]):
+  """Trains until the agent converges, at most `schedule.env_steps` updates."""
 
   _unit = "update"
 

@@ -40,6 +40,8 @@ def figure(
 ) -> matplotlib.figure.Figure:
   """Draws rows of panels with one legend below.
 
+  Where no method has environment steps there are bars with a dot a seed.
+
   Args:
     cells: rows of panels; they may differ in length.
     lines: at least one.
@@ -47,9 +49,6 @@ def figure(
     quantity: "success" or "return".
     kind: of the estimates, "mean" or "iqm".
     size: width and height of a panel, inches.
-
-  Returns:
-    The figure; where no method has environment steps, bars with a dot a seed.
   """
   end = max(int(curve.steps[-1]) for curve, _ in lines.values())
   present = {method for _, method in lines}

@@ -112,13 +112,7 @@ def learning_curve(
 ) -> list[str]:
   """Draws each task's success or return: mean and standard deviation of seeds.
 
-  Args:
-    runs: seeds of one method and main task.
-    output: the picture; its suffix chooses the format (png, pdf, svg).
-    quantity: "success" or "return".
-
-  Returns:
-    Notes on runs that were cut.
+  The runs are seeds of one method and main task. See `draw` for the rest.
 
   Raises:
     ValueError: no evaluation has the quantity.

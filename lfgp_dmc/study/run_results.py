@@ -35,10 +35,7 @@ class Curve(NamedTuple):
 
 
 def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
-  """Reads runs.
-
-  Args:
-    folders: runs, folders of runs, or patterns of either.
+  """Reads runs, those in folders of runs, and those that match patterns.
 
   Returns:
     The runs with an evaluation, sorted, and notes on those without.
@@ -68,11 +65,9 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
 
 
 def method_of(config: Mapping[str, Any]) -> str:
-  """The method that a run's config describes.
+  """The algorithm, with `_transfer` if the run starts from another one.
 
-  Returns:
-    The algorithm; after it `_transfer` if the run starts from another one, else
-    `_play` if the demonstrations' folder is named so, as `stack_play`.
+  Else with `_play` if the demonstrations' folder is named so, as `stack_play`.
   """
   algorithm = str(config.get("algorithm", "?"))
   folder = pathlib.Path(config.get("demonstrations") or "")

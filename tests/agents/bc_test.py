@@ -138,7 +138,6 @@ class EarlyStopTest(absltest.TestCase):
     self.assertFalse(agent.has_converged)
 
   def test_learns_and_converges_on_synthetic_data(self):
-    torch.set_num_threads(1)
     agent = make_bc(("stack",), overfit_tolerance=5)
     start = np.mean(agent.validation_losses())
     for _ in range(500):
@@ -205,7 +204,3 @@ class ContractTest(parameterized.TestCase):
     shown = fixtures.demonstrations()
     with self.assertRaisesRegex(ValueError, "the environment has \\(3, 2\\)"):
       build(BcConfig(), TASKS, shown, None, 0, "cpu", 3, A)
-
-
-if __name__ == "__main__":
-  absltest.main()

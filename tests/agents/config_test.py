@@ -2,7 +2,7 @@
 
 import dataclasses
 
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.lfgp.config import LfgpConfig
@@ -95,7 +95,3 @@ class LfgpConfigTest(parameterized.TestCase):
     for name in _fields(kind):
       with self.assertRaisesRegex(ValueError, name.rpartition(".")[2]):
         kind(**fixtures.nested({"reward.kind": "discriminator", name: None}))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -6,7 +6,7 @@ it was recorded stays what it was.
 """
 
 import torch
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves, tree_map
 
@@ -142,7 +142,3 @@ class RecordingTest(parameterized.TestCase):
     number = 5.0
     tape.replay()
     self.assertEqual(state.tolist(), [2.0, 2.0])
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -52,7 +52,3 @@ class DeviceReplayTest(absltest.TestCase):
     self._add(70)
     self.rows = DeviceReplay(self.replay, torch.device("cpu"))
     self._check()
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -186,7 +186,8 @@ def train_on_toy(agent, replay, env_steps: int, folder: str) -> None:
     env_steps=env_steps, warmup_steps=100, progress_bar=False
   )
   log = metrics.MetricsLog(folder)
-  loop.train(toy.PointEnvironment(), agent, replay, schedule, log)
+  environment = toy.PointEnvironment()
+  loop.EpisodeRounds(environment, agent, replay, schedule, log).run()
 
 
 def evaluate_on_toy(agent, episodes: int):

@@ -156,7 +156,3 @@ class ExpertPoolTest(absltest.TestCase):
   def test_missing_demonstrations_are_named(self):
     with self.assertRaisesRegex(ValueError, "no demonstrations of lift"):
       ExpertPool(fixtures.demonstrations(TASKS[:2]), TASKS, Standardiser(OBS))
-
-
-if __name__ == "__main__":
-  absltest.main()

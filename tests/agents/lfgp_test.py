@@ -42,10 +42,6 @@ def _step(agent, row):
 
 
 class LearningTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    torch.set_num_threads(1)
-
   @parameterized.parameters(
     (TASKS, {}),
     (TASKS, {"reward.main_masked": "0:2", "reward.input": "state"}),
@@ -99,16 +95,9 @@ class ContractTest(parameterized.TestCase):
     first = agent.metrics()
     names = ["discriminator", "critic", "policy", "temperature"]
     names = [f"loss/{name}" for name in names]
-    for name in [
-      "accuracy_expert",
-      "accuracy_policy",
-      "reward",
-      "q",
-      "temperature",
-      "entropy",
-      "scheduler",
-    ]:
-      names += [f"{name}/{task}" for task in TASKS]
+    by_task = ("accuracy_expert", "accuracy_policy", "reward", "q",
+               "temperature", "entropy", "scheduler")  # fmt: skip
+    names += [f"{name}/{task}" for name in by_task for task in TASKS]
     self.assertContainsSubset(names, first)
     self.assertTrue(math.isnan(first["loss/critic"]))
     self.assertEqual(sum(first[f"scheduler/{t}"] for t in TASKS), 1.0)
@@ -244,7 +233,3 @@ class DeterminismTest(parameterized.TestCase):
     before = state["heads.output.bias"].copy()
     agent.update()
     np.testing.assert_array_equal(state["heads.output.bias"], before)
-
-
-if __name__ == "__main__":
-  absltest.main()

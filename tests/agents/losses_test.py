@@ -236,7 +236,3 @@ class RewardsTest(parameterized.TestCase):
       torch.tensor([-9.0, 9.0]), clip=5.0, scale=0.1
     )
     torch.testing.assert_close(reward, torch.tensor([-0.5, 0.5]))
-
-
-if __name__ == "__main__":
-  absltest.main()

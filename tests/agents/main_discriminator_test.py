@@ -65,7 +65,3 @@ class MainDiscriminatorTest(absltest.TestCase):
         state["discriminator"]["output.weight"][index],
       )
       self.assertTrue(torch.equal(own.main_discriminator.output.weight, kept))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import torch
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 from torch.nn import functional
 
 from lfgp_dmc.agents import synthetic
@@ -192,7 +192,3 @@ class PlainUpdateTest(parameterized.TestCase):
       itertools.chain(*gradients), itertools.chain(*expected), strict=True
     ):
       torch.testing.assert_close(one, other_one, rtol=1e-4, atol=2e-5)
-
-
-if __name__ == "__main__":
-  absltest.main()

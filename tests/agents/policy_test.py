@@ -1,8 +1,6 @@
 """Stored policies: save and load, acting, faults."""
 
 import json
-import pathlib
-import tempfile
 
 import numpy as np
 import torch
@@ -11,6 +9,7 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
+from tests.fixtures import FolderTest
 
 TASKS = ("main", "first")
 OBS, A, H = 5, 3, 8
@@ -88,11 +87,10 @@ class ActingTest(absltest.TestCase):
         call()
 
 
-class FolderTest(parameterized.TestCase):
+class StoredTest(FolderTest):
   def setUp(self):
     super().setUp()
-    parent = self.enter_context(tempfile.TemporaryDirectory())
-    self.folder = pathlib.Path(parent) / "policy"
+    self.folder /= "policy"
 
   @parameterized.parameters("shared_trunk", "separate")
   def test_round_trip_acts_the_same(self, layout):
@@ -163,7 +161,3 @@ class FolderTest(parameterized.TestCase):
     del options["layout"]
     loaded = Policy.from_arrays(policy.arrays(), options)
     np.testing.assert_array_equal(loaded.act(row), policy.act(row))
-
-
-if __name__ == "__main__":
-  absltest.main()

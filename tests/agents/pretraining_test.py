@@ -155,7 +155,7 @@ class PriorTest(parameterized.TestCase):
     )
     agent.prepare()
     agent.update()
-    self.assertIn("distance_from_prior/stack", agent.metrics())
+    self.assertTrue(np.isfinite(agent.metrics()["distance_from_prior/stack"]))
 
   def test_entropy_by_hand(self):
     network = make_agent().learner.networks.intentions
@@ -175,7 +175,6 @@ class KeptSuccessTest(absltest.TestCase):
   """A thousand updates after pretraining: success is not lost."""
 
   def test_success_of_cloning_is_kept(self):
-    torch.set_num_threads(1)
     plan = CollectionPlan(
       lambda task: toy.PointEnvironment(),
       toy.WalkingActor,
@@ -219,7 +218,3 @@ def _distance(agent, shown):
     for task, data in shown.items()
   ]
   return float(np.sqrt(np.mean(squares)))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -86,7 +86,6 @@ class StoredRewardsTest(absltest.TestCase):
         make_agent(shown={}, replay=replay, **{"reward.kind": "stored"})
 
   def test_returns_rise(self):
-    torch.set_num_threads(1)
     agent, replay = fixtures.make_toy_agent(
       1,
       2000,
@@ -231,7 +230,3 @@ class ExamplesTest(absltest.TestCase):
     shown = fixtures.demonstrations(pairs=10, attempt=50)
     with self.assertRaisesRegex(ValueError, r"is_last.*stack"):
       make_agent(shown=shown, **_EXAMPLES)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -233,7 +233,3 @@ def _play(scheduler, episodes=5):
     scheduler.end_episode([float(number - c) for c in choices])
     played.append(choices)
   return played
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -87,7 +87,3 @@ def _optimum():
   """Going ahead and staying there: gamma^n / (1 - gamma), n steps before."""
   left = np.maximum(STATES - 2 - np.arange(STATES), 0)
   return 0.9**left / 0.1
-
-
-if __name__ == "__main__":
-  absltest.main()

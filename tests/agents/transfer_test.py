@@ -1,7 +1,7 @@
 """What a new agent takes over from another: exactly what it says."""
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.agents import synthetic
 from tests.agents import fixtures
@@ -154,7 +154,3 @@ class InitFromTest(parameterized.TestCase):
       agent.start_from(_agent(("bring",)).policy)
     with self.assertRaisesRegex(ValueError, "the policy: .*has shape"):
       agent.start_from(_agent(NEW, **{"networks.hidden_size": 8}).policy)
-
-
-if __name__ == "__main__":
-  absltest.main()

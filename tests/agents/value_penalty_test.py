@@ -110,7 +110,3 @@ class AgentTest(absltest.TestCase):
     self.assertGreater(means[0.0]["q/reach"], high + 1)
     self.assertLess(means[10.0]["q/reach"], high + 0.5)
     self.assertGreater(means[10.0]["loss/value_penalty"], 0.0)
-
-
-if __name__ == "__main__":
-  absltest.main()

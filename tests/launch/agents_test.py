@@ -2,7 +2,7 @@
 
 import inspect
 
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import task_names, types
 from lfgp_dmc.agents import synthetic
@@ -15,7 +15,7 @@ class AgentContractTest(parameterized.TestCase):
   def test_has_every_member_with_its_signature(self, name):
     algorithm, tasks = configs.ALGORITHMS[name], task_names.task_set("stack")
     agent = algorithm.build(
-      configs.to_run_config(configs.make_config(name)).agent,
+      configs.from_dict(configs.make_config(name).to_dict()).agent,
       tasks,
       synthetic.demonstrations(tasks, 60, 3, 2),
       Replay(4, 3, 2, reward_tasks=tasks),
@@ -36,7 +36,3 @@ class AgentContractTest(parameterized.TestCase):
       found = inspect.signature(getattr(type(agent), member)).parameters
       expected = inspect.signature(wanted).parameters
       self.assertEqual([*found], [*expected], member)
-
-
-if __name__ == "__main__":
-  absltest.main()

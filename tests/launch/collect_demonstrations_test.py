@@ -8,7 +8,6 @@ import sys
 import time
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import demonstrations
@@ -88,7 +87,3 @@ class CollectDemonstrationsTest(shared.FolderTest):
     self.assertEqual(running.returncode, command.INTERRUPTED, errors)
     self.assertNotIn("Traceback", errors)
     self.assertEmpty(os.listdir(self.folder))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,6 @@ import json
 import pathlib
 import subprocess
 import tempfile
-from concurrent import futures
 
 from absl.testing import absltest
 
@@ -12,34 +11,35 @@ from lfgp_dmc import graphics, task_names
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, policies, training
 from lfgp_dmc.pictures import video
+from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
 
 
-class DemoTest(absltest.TestCase):
+class DemoTest(FolderTest):
   def test_collects_trains_and_leaves_table_figure_and_video(self):
-    folder = pathlib.Path(self.create_tempdir().full_path)
     flagfile = _ROOT / "launch" / "flags" / "quickstart.flags"
     stored = _ROOT / "results" / "policies" / "stack"
     done = fixtures.call(
       f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
-      f"--stored={stored} "
+      f"--stored={stored} --config.main_task=open_gripper "
       "--config.collect_pairs=40 --config.env_steps=360 "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
       "--config.agent.pretraining.updates=5",
-      str(folder),
+      self.folder,
+      fresh=True,
     )
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(
       done.stdout,
-      r"task +untrained +warm start +trained +stored +expert\nstack",
+      r"task +untrained +warm start +trained +stored +expert\nopen_gripper",
     )
     self.assertIn("total time", done.stdout)
-    self.assertTrue((folder / "runs/demo/learning_curve.png").exists())
+    self.assertTrue((self.folder / "runs/demo/learning_curve.png").exists())
     if not graphics.fault():
-      self.assertTrue((folder / "runs/demo/video.mp4").exists())
+      self.assertTrue((self.folder / "runs/demo/video.mp4").exists())
 
 
 class BlockRunTest(absltest.TestCase):
@@ -147,18 +147,18 @@ class BlockRunTest(absltest.TestCase):
     self.assertNotIn("GLFW", done.stderr)
 
   def test_benchmarks_print_the_agreed_lines(self):
-    small = "--config.agent.networks.hidden_size=16"
-    with futures.ThreadPoolExecutor(command.cores()) as pool:
-      lines = (
-        "benchmark.py --what=environment --steps=50",
-        "benchmark.py --what=stability --steps=50 --tasks=reach",
-        f"benchmark.py --what=training --steps=3 {small}",
-        f"benchmark.py --what=learner --seconds=0 {small}",
-        f"benchmark.py --what=memory --steps=3 {small} "
-        "--config.replay_capacity=2000",
-      )
-      calls = list(pool.map(self._call, lines))
-    names = [_names(done) for done in calls]
+    small = (
+      "--config.agent.networks.hidden_size=16 --config.agent.batch_size=8 "
+      "--config.agent.reward.batch_size=8"
+    )
+    lines = (
+      "environment --steps=50",
+      "stability --steps=50 --tasks=reach",
+      f"training --steps=3 --seconds=0 {small}",
+      f"learner --seconds=0 {small}",
+      f"memory --steps=3 {small} --config.replay_capacity=2000",
+    )
+    names = [_names(self._call(f"benchmark.py --what={x}")) for x in lines]
     self.assertEqual(
       names[0],
       ["control_steps_per_s", "mj_step_per_s", "mj_step_fraction", "reset_ms"],
@@ -187,7 +187,3 @@ def _names(done: subprocess.CompletedProcess) -> list[str]:
   for line in done.stdout.splitlines():
     float(line.partition("=")[2])
   return [line.partition("=")[0] for line in done.stdout.splitlines()]
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,7 @@ import json
 import pathlib
 
 from absl import flags
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.launch import config_flags, configs
@@ -54,11 +54,18 @@ class ConfigTest(parameterized.TestCase):
     config = resolve(f"--config.algorithm={algorithm}", f"--preset={preset}")
     self.assertEqual(config.algorithm, algorithm)
     values = dict(configs.flattened(config.to_dict()))
-    own = configs.ALGORITHMS[algorithm].defaults
-    self.assertEqual({name: values[name] for name in own}, own)
-    for name, value in configs.PRESETS[preset].items():
-      kept = name in own or algorithm != "lfgp"
-      self.assertTrue(kept or values[name] == value, name)
+    chosen, of_preset = configs.ALGORITHMS[algorithm], configs.PRESETS[preset]
+    self.assertEqual({k: values[k] for k in chosen.defaults}, chosen.defaults)
+    for name, value in of_preset.items():
+      group = ".".join(name.split(".")[:2])
+      kind = group + configs.KIND
+      is_left_out = (
+        name in chosen.defaults
+        or name not in values
+        or group.removeprefix("agent.") in chosen.without
+        or values.get(kind) != of_preset.get(kind)
+      )
+      self.assertTrue(is_left_out or values[name] == value, name)
 
   def test_presets_name_fields_that_exist_and_their_kinds(self):
     for preset, changes in configs.PRESETS.items():
@@ -171,8 +178,8 @@ class ConfigTest(parameterized.TestCase):
   @parameterized.parameters(*configs.PRESETS)
   def test_no_preset_makes_sacx_need_demonstrations(self, preset):
     config = resolve("--config.algorithm=sacx", f"--preset={preset}")
-    self.assertFalse(config.uses_demonstrations)
-    self.assertTrue(config.keeps_rewards)
+    self.assertFalse(config.agent.uses_demonstrations)
+    self.assertTrue(config.agent.keeps_rewards)
 
 
 class FlagfilesTest(parameterized.TestCase):
@@ -182,7 +189,9 @@ class FlagfilesTest(parameterized.TestCase):
       config = resolve(
         f"--flagfile={_FLAGS / name}", f"--config.main_task={task}"
       )
-      self.assertEqual(config.uses_demonstrations, bool(config.demonstrations))
+      self.assertEqual(
+        config.agent.uses_demonstrations, bool(config.demonstrations)
+      )
       if name != "quickstart.flags" and config.demonstrations:
         self.assertStartsWith(config.demonstrations, f"data/{task}_")
 
@@ -207,7 +216,3 @@ class FlagfilesTest(parameterized.TestCase):
     config = resolve(f"--flagfile={path}", task, "--config.transfer_from=")
     self.assertEqual(config.agent.scheduler.kind, "conditional_weighted")
     self.assertEqual(config.transfer_from, "")
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -3,7 +3,6 @@
 import pathlib
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc.launch import datasets
 from lfgp_dmc.launch.command import UserError
@@ -40,7 +39,3 @@ class DatasetsTest(fixtures.RunTest):
     self.assertLen(shown["lift"], 50)
     with self.assertRaisesRegex(UserError, "stack.npz: missing"):
       datasets.load(config, ["lift", "stack"], (59, 4))
-
-
-if __name__ == "__main__":
-  absltest.main()

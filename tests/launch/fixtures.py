@@ -14,23 +14,33 @@ import numpy as np
 
 from lfgp_dmc import toy
 from lfgp_dmc.agents import synthetic
-from lfgp_dmc.data import csv_files, demonstrations
+from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import configs, training
 from lfgp_dmc.runs import run
 from tests import fixtures
+from tests.launch import forked
 
 POINT = "lfgp_dmc.toy:PointEnvironment"
 _LAUNCH = pathlib.Path(configs.__file__).resolve().parents[1]
 _DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL", "PYOPENGL_PLATFORM")
 
 
-def call(line: str, folder: os.PathLike | str) -> subprocess.CompletedProcess:
-  """Runs a command, such as `plot.py --runs=a`, without a display."""
+def call(
+  line: str, folder: os.PathLike | str, *, fresh: bool = False
+) -> subprocess.CompletedProcess:
+  """Runs a command, such as `plot.py --runs=a`, without a display.
+
+  With `fresh` as users start it, else faster: by `forked`.
+  """
   script, *arguments = line.split()
+  command = [str(_LAUNCH / script), *arguments]
+  variables = {k: v for k, v in os.environ.items() if k not in _DISPLAYS}
+  if not fresh:
+    return forked.run(command, str(folder), variables)
   return subprocess.run(
-    [sys.executable, _LAUNCH / script, *arguments],
+    [sys.executable, *command],
     cwd=folder,
-    env={k: v for k, v in os.environ.items() if k not in _DISPLAYS},
+    env=variables,
     capture_output=True,
     text=True,
     check=False,
@@ -108,21 +118,14 @@ def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
   known = dict(configs.flattened(config.to_dict()))
   small = {name: value for name, value in small.items() if name in known}
   config.update_from_flattened_dict({**small, **changes})
-  return configs.to_run_config(config)
-
-
-_RATES = ("wall_s", "steps_per_s", "updates_per_s")
-
-
-def rows(path: pathlib.Path) -> list[dict[str, str]]:
-  """A run's CSV file without what depends on the clock."""
-  _, found = csv_files.read(path)
-  return [{k: v for k, v in row.items() if k not in _RATES} for row in found]
+  return configs.from_dict(config.to_dict())
 
 
 def numbers(run: pathlib.Path) -> list[list[dict[str, str]]]:
   """The rows of a run's metrics and of its evaluations."""
-  return [rows(run / name) for name in ("metrics.csv", "evaluation.csv")]
+  return [
+    fixtures.rows(run / name) for name in ("metrics.csv", "evaluation.csv")
+  ]
 
 
 @contextlib.contextmanager

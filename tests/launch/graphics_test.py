@@ -79,7 +79,3 @@ class SetUpGraphicsTest(absltest.TestCase):
       self.assertEqual(set_up_graphics.main(), 0)
     run.assert_called_once()  # the check alone
     self.assertIn("apt-get install -y libegl1", printed.call_args.args[0])
-
-
-if __name__ == "__main__":
-  absltest.main()

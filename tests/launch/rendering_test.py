@@ -17,6 +17,7 @@ from lfgp_dmc import graphics
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import clips, command, policies, view
 from lfgp_dmc.pictures.recorder import Look
+from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
@@ -80,11 +81,7 @@ class PolicyTest(absltest.TestCase):
 
 
 @unittest.skipIf(graphics.fault(), graphics.fault())
-class RenderingTest(absltest.TestCase):
-  def setUp(self):
-    super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-
+class RenderingTest(FolderTest):
   def _render(self, line: str) -> subprocess.CompletedProcess:
     small = "--height=64 --width=96 --noshadows"
     return fixtures.call(f"render_policy.py {small} {line}", self.folder)
@@ -176,7 +173,3 @@ class OwnArraysTest(absltest.TestCase):
     exec(code, arrays)
     found = demonstrations.read_folder(folder, ["stack"], 59, 4)
     self.assertLen(found["stack"], 5)
-
-
-if __name__ == "__main__":
-  absltest.main()

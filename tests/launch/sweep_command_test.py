@@ -1,20 +1,17 @@
 """The sweep command itself, on the toy environment."""
 
 import os
-import pathlib
 import signal
 import subprocess
 
-from absl.testing import absltest
-
 from lfgp_dmc.launch import command
+from tests.fixtures import FolderTest
 from tests.launch import sweep_fixtures
 
 
-class SweepCommandTest(absltest.TestCase):
+class SweepCommandTest(FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     sweep_fixtures.write_flagfiles(self.folder, lfgp=3000)
 
   def _start(self, *arguments) -> subprocess.Popen:
@@ -52,18 +49,3 @@ class SweepCommandTest(absltest.TestCase):
     again = self._call()
     self.assertEqual(again.returncode, 0)
     self.assertNotIn("started", again.stdout)
-
-  def test_bad_input_is_told(self):
-    for arguments, message in (
-      (["--seeds=a"], "--seeds: invalid literal"),
-      (["--algorithms=sorcery"], "none of these runs has a flagfile"),
-      (["--start_from=a"], "valid: TARGET:SOURCE"),
-    ):
-      done = self._call(*arguments)
-      self.assertEqual(done.returncode, 1)
-      self.assertIn(message, done.stderr)
-      self.assertNotIn("Traceback", done.stderr)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -15,10 +15,9 @@ import signal
 import tempfile
 from unittest import mock
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch import command
+from tests.fixtures import FolderTest
 from tests.launch import sweep_fixtures
 
 _STEPS = {"lfgp_right": 1200, "lfgp_transfer_right": 200}
@@ -30,7 +29,7 @@ _VARIABLES = {
 _STORE = 80 * 2**20  # B; about the least that Ray takes
 
 
-class SweepRayTest(absltest.TestCase):
+class SweepRayTest(FolderTest):
   @classmethod
   def setUpClass(cls):
     super().setUpClass()
@@ -53,7 +52,6 @@ class SweepRayTest(absltest.TestCase):
 
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.runs = self.folder / "runs"
 
   def _start(self, *arguments):
@@ -87,13 +85,13 @@ class SweepRayTest(absltest.TestCase):
     )
     second = self.second.node_id
     lost = sweep_fixtures.wait_for(lambda: self._halfway_on(second))
-    train = _processes(f"--run=runs/{lost}")
+    train = self._processes(f"--run=runs/{lost}")
     self.assertNotEmpty(train)
     self.cluster.remove_node(self.second, allow_graceful=False)
     for worker in train.values():  # the raylet's end alone may take it 5 s
       os.kill(worker, signal.SIGKILL)
     sweep_fixtures.wait_for(
-      lambda: not train.keys() & _processes(f"--run=runs/{lost}"), 5
+      lambda: not train.keys() & self._processes(f"--run=runs/{lost}"), 5
     )
     reached = self._checkpoint(lost)
     kept = [row for row in self._rows(lost, "metrics.csv")
@@ -137,6 +135,20 @@ class SweepRayTest(absltest.TestCase):
         return log.stem
     return ""
 
+  def _processes(self, argument: str) -> dict[int, int]:
+    """Process -> parent, of those in our folder that have this argument."""
+    found = {}
+    for process in pathlib.Path("/proc").glob("[0-9]*"):
+      try:
+        arguments = (process / "cmdline").read_text(errors="replace")
+        is_ours = (process / "cwd").samefile(self.folder)
+        _, _, stat = (process / "stat").read_text().rpartition(")")
+      except OSError:  # it has ended, or is another user's
+        continue
+      if is_ours and argument in arguments.split("\0"):
+        found[int(process.name)] = int(stat.split()[1])
+    return found
+
   def _write_table(self, index: dict[str, dict[str, str]]) -> None:
     if "TABLE" not in os.environ:
       return
@@ -164,21 +176,3 @@ class SweepRayTest(absltest.TestCase):
     self.assertEqual(row["state"], "stopped")
     log = (self.runs / "lfgp_right_0.log").read_text()
     self.assertIn(f"stopped at {self._checkpoint('lfgp_right_0')} of", log)
-
-
-def _processes(argument: str) -> dict[int, int]:
-  """Process -> parent, of the processes that have this argument."""
-  found = {}
-  for process in pathlib.Path("/proc").glob("[0-9]*"):
-    try:
-      arguments = (process / "cmdline").read_text(errors="replace").split("\0")
-      _, _, stat = (process / "stat").read_text().rpartition(")")
-    except OSError:  # it has ended
-      continue
-    if argument in arguments:
-      found[int(process.name)] = int(stat.split()[1])
-  return found
-
-
-if __name__ == "__main__":
-  absltest.main()

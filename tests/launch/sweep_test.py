@@ -1,14 +1,12 @@
 """Sweeps: which runs there are, and how they come to their end."""
 
 import json
-import pathlib
 import time
 from unittest import mock
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch import sweep, sweep_jobs
+from tests.fixtures import FolderTest
 
 
 class FakeEngine:
@@ -33,10 +31,9 @@ class FakeEngine:
     return over
 
 
-class SweepTest(absltest.TestCase):
+class SweepTest(FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     self.flags = self.folder / "flags"
     self.flags.mkdir()
     for stem in ("lfgp", "lfgp_transfer"):
@@ -44,12 +41,7 @@ class SweepTest(absltest.TestCase):
 
   def _jobs(self, algorithms, seeds=(0,), starts=(), arguments=()):
     jobs = sweep_jobs.make_jobs(
-      algorithms,
-      ("stack", "bring"),
-      seeds,
-      self.folder,
-      arguments,
-      self.flags,
+      algorithms, ("stack", "bring"), seeds, self.folder, arguments, self.flags
     )
     sweep_jobs.chain(jobs, starts)
     return jobs
@@ -153,7 +145,3 @@ class SweepTest(absltest.TestCase):
     self.assertIn("--resume", again[0].train_arguments())
     row = csv_files.read(index)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
-
-
-if __name__ == "__main__":
-  absltest.main()

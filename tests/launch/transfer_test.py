@@ -4,7 +4,6 @@ import shutil
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
@@ -14,6 +13,7 @@ from lfgp_dmc.launch import assemble, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
+from tests import fixtures as shared
 from tests.launch import fixtures
 
 
@@ -58,7 +58,7 @@ class SacxTest(_RunTest):
     np.testing.assert_allclose(
       stored.gather_rewards(rows), np.stack(expected, axis=1), atol=1e-5
     )
-    (*_, last) = fixtures.rows(path / "metrics.csv")
+    (*_, last) = shared.rows(path / "metrics.csv")
     self.assertEqual(last["loss/discriminator"], "nan")
     self.assertNotEqual(last["reward/left"], "nan")
 
@@ -90,9 +90,11 @@ class SacxTest(_RunTest):
       self.train(self.config("sacx", **config), "a")
 
   def test_the_block_world_shows_the_rewards_of_all_nine_tasks(self):
-    config = configs.to_run_config(configs.make_config("sacx"))
-    environment = config.world.build(config.keeps_rewards)
-    shown = environments.tasks_with_rewards(environment, ("stack", "reach"))
+    config = configs.from_dict(configs.make_config("sacx").to_dict())
+    environment = config.environment_spec.build(config.agent.keeps_rewards)
+    shown = environments.with_observed_tasks(
+      environment, ("stack", "reach"), "reward/"
+    )
     self.assertEqual(shown[:2], ("stack", "reach"))
     self.assertCountEqual(shown, task_names.ALL_TASKS)
 
@@ -203,9 +205,15 @@ class InitFromTest(_RunTest):
     config = self.config(
       init_from=str(bare), **{"agent.networks.actor_trunk": "own"}
     )
-    with mock.patch.object(Run, "train") as train:
-      train.return_value = None
+    rows, acts = np.eye(2, dtype=np.float32), []
+
+    def look(run):
+      acts.append(run.agent.policy.act(rows, "left"))
+
+    with mock.patch.object(Run, "train", look):
       self.train(config, "a")
+    expected = Policy.load(source).act(rows, "left")
+    np.testing.assert_array_equal(acts, [expected])
     self.train(config, "a", resume=True)  # was killed at once: starts again
     wrong = self.config(
       init_from=str(self.folder / "data"),
@@ -216,7 +224,7 @@ class InitFromTest(_RunTest):
 
 
 class ExamplesTest(_RunTest):
-  def test_learns_from_rows_of_success(self):
+  def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     config = self.config(
       **{
         "agent.reward.kind": "examples",
@@ -225,11 +233,6 @@ class ExamplesTest(_RunTest):
         "agent.reward.scale": 0.1,
       }
     )
-    path, _ = self.train(config, "a")
-    (*_, last) = fixtures.rows(path / "metrics.csv")
+    self.check_resume(config)
+    (*_, last) = shared.rows(self.folder / "runs/whole/metrics.csv")
     self.assertAlmostEqual(float(last["value_low/left"]), -10.0, places=4)
-    self.train(config, "a", resume=True)
-
-
-if __name__ == "__main__":
-  absltest.main()

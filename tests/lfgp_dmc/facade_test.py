@@ -109,7 +109,3 @@ class SeedingTest(absltest.TestCase):
     self.assertEqual(
       seeding.generator(5, "a").random(), seeding.generator(5, "a").random()
     )
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -1,7 +1,7 @@
 """Contact that can be trusted: grasps hold, stacks stand, slots take."""
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.tasks import workspace as ws
 from tests.tasks import fixtures
@@ -111,7 +111,3 @@ class ContactTest(parameterized.TestCase):
     timestep = self.wait(5)
     self.assertEqual(self.env.task.blocks_out, before + 1)
     self.assertFalse(timestep.last())
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -3,7 +3,7 @@
 import itertools
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.tasks import control
 from lfgp_dmc.tasks import workspace as ws
@@ -110,7 +110,3 @@ class CheckActionTest(parameterized.TestCase):
   def test_nan_is_refused(self):
     with self.assertRaisesRegex(ValueError, "NaN"):
       control.check_action([0.0, np.nan, 0.0, 0.0])
-
-
-if __name__ == "__main__":
-  absltest.main()

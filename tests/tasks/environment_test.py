@@ -3,7 +3,7 @@
 import functools
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 from dm_control import composer
 
 import lfgp_dmc
@@ -244,7 +244,3 @@ class RewardTest(parameterized.TestCase):
     env = self.start(control_hz=5)
     flags = [self.opened(env, _OPENS) for _ in range(3)]
     self.assertEqual(flags, [False, False, True])
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -100,7 +100,3 @@ class FeaturesTest(absltest.TestCase):
     loaded = fixtures.repeat(self.env, [0, 0, 0, 1.0], 20).observation
     force = np.linalg.norm(np.arctanh(loaded["force_torque"][:3])) * 100.0
     self.assertAlmostEqual(force, 0.1 * 9.81, delta=0.05)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.goals import GOALS, terms
@@ -165,7 +165,3 @@ class RewardsTest(parameterized.TestCase):
     self.assertEqual(terms.off_tray_penalty(_REST), 0.0)
     raised = state(green=(-0.1, 0.5, ws.STACKED_Z))
     self.assertEqual(terms.off_tray_penalty(raised), -0.1)
-
-
-if __name__ == "__main__":
-  absltest.main()

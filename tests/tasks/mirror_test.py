@@ -1,7 +1,7 @@
 """Mirror images are what the simulator and the experts would have done."""
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import flatten, observations
 from lfgp_dmc.data import demonstration_checks
@@ -117,7 +117,3 @@ class MirrorTest(parameterized.TestCase):
       found.next_observation[6:], mirror.observation(shown.next_observation)
     )
     self.assertEmpty(demonstration_checks.of_arrays(found.arrays(), None, None))
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -3,20 +3,20 @@
 import pathlib
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.tasks import published_examples
 from lfgp_dmc.tasks import workspace as ws
+from tests.fixtures import FolderTest
 from tests.tasks import fixtures
 
 _DATA = pathlib.Path(__file__).parents[1] / "data"
 
 
-class PublishedExamplesTest(parameterized.TestCase):
+class PublishedExamplesTest(FolderTest):
   def setUp(self):
     super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
     for task in ("stack", "lift", "reach"):
       with np.load(_DATA / f"published_{task}.npz", allow_pickle=False) as part:
         rows = {name: part[name][::3] for name in part.files}
@@ -73,7 +73,3 @@ class PublishedExamplesTest(parameterized.TestCase):
       observed = env.step([0.0, 0.0, 0.0, action[3]]).observation
       holding.append(bool(observed[f"condition/{task}"]))
     self.assertGreaterEqual(np.mean(holding), 0.98)
-
-
-if __name__ == "__main__":
-  absltest.main()

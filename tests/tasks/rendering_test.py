@@ -34,7 +34,3 @@ class RenderingTest(parameterized.TestCase):
     with self.assertRaisesRegex(KeyError, "block_positions"):
       lfgp_dmc.flatten(timestep.observation)
     env.close()
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -149,8 +149,7 @@ class CollectTest(parameterized.TestCase):
     other = _collect(_plan(seed=6), tasks=("left",))
     self.assertFalse(
       np.array_equal(
-        other["left"].demonstrations.action,
-        alone["left"].demonstrations.action,
+        other["left"].demonstrations.action, alone["left"].demonstrations.action
       )
     )
 
@@ -193,9 +192,7 @@ class LeadTest(absltest.TestCase):
     """The actor's log of some attempts, (task, steps) each."""
     actor = _Recorder()
     plan = _plan(
-      lambda: actor,
-      make_environment=lambda task: _Long(),
-      tasks=self._TASKS,
+      lambda: actor, make_environment=lambda task: _Long(), tasks=self._TASKS
     )
     _, attempts = Collector(plan)((task, numbers))
     return actor.log, attempts
@@ -240,7 +237,3 @@ class _Long(_PlayPoint):
     names = LeadTest._TASKS
     timestep.observation.update({f"success/{name}": done for name in names})
     return timestep
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -2,7 +2,6 @@
 
 import functools
 import os
-import pathlib
 
 import numpy as np
 from absl.testing import absltest
@@ -11,6 +10,7 @@ from lfgp_dmc import toy
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
+from tests.fixtures import FolderTest
 
 _ROWS = [
   EvaluationRow(1000, "right", 0, 7, 1, 4, 2.5),
@@ -25,10 +25,17 @@ class _Seeded(toy.PointEnvironment):
   reseed = property()  # hasattr says no
 
 
+class _Steady(toy.WalkingActor):
+  """Walks alike in every episode."""
+
+  def begin(self, task, seed):
+    super().begin(task, 0)
+
+
 def _evaluate(make=toy.PointEnvironment, **options):
   return evaluation.evaluate(
     make,
-    toy.WalkingActor,
+    options.pop("make_actor", toy.WalkingActor),
     options.pop("tasks", toy.TASKS),
     episodes=3,
     seed=options.pop("seed", 7),
@@ -58,7 +65,13 @@ class EvaluateTest(absltest.TestCase):
   def test_an_episode_depends_on_seed_and_number_alone(self):
     both, left = _evaluate(), _evaluate(tasks=("left",))
     self.assertEqual(both[3:], left)
-    self.assertNotEqual(_evaluate(seed=8), both)
+
+  def test_resets_follow_the_seed(self):
+    returns = [
+      [row.episode_return for row in _evaluate(make_actor=_Steady, seed=seed)]
+      for seed in (7, 8)
+    ]
+    self.assertNotEqual(*returns)
 
   def test_environments_without_reseed_are_built_anew(self):
     rows = _evaluate(_Seeded)
@@ -73,9 +86,9 @@ class EvaluateTest(absltest.TestCase):
     self.assertIsNone(rows[1].steps_to_success)
 
 
-class FilesTest(absltest.TestCase):
+class FilesTest(FolderTest):
   def test_round_trip_and_append(self):
-    path = pathlib.Path(self.create_tempdir().full_path) / "evaluation.csv"
+    path = self.folder / "evaluation.csv"
     evaluation_csv.append_csv(path, _ROWS)
     evaluation_csv.append_csv(path, _ROWS[:1])
     self.assertEqual(evaluation_csv.read_csv(path), [*_ROWS, _ROWS[0]])
@@ -86,7 +99,7 @@ class FilesTest(absltest.TestCase):
     self.assertEqual(lines[2], "1000,right,1,7,0,,0.1")
 
   def test_another_csv_is_refused(self):
-    path = pathlib.Path(self.create_tempdir().full_path) / "a.csv"
+    path = self.folder / "a.csv"
     path.write_text("env_step\n1\n")
     with self.assertRaisesRegex(ValueError, "a.csv is no evaluation"):
       evaluation_csv.read_csv(path)
@@ -109,7 +122,3 @@ class EnvironmentsTest(absltest.TestCase):
     rewards = environments.task_rewards(timestep, ("right", "left", "other"))
     self.assertEqual(rewards[2], rewards[0])
     self.assertAlmostEqual(float(rewards[0] + rewards[1]), 0.4, places=5)
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -6,7 +6,7 @@ from unittest import mock
 
 import h5py
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import DatasetError
@@ -165,7 +165,3 @@ class DemonstrationsTest(fixtures.FolderTest):
     header, row = table.splitlines()
     self.assertIn("episodes", header)
     self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -2,17 +2,12 @@
 
 import importlib.util
 import os
-import pathlib
-import subprocess
-import sys
 import unittest
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc.data import demonstrations
-from lfgp_dmc.launch import command
 
 if not importlib.util.find_spec("minari"):
   raise unittest.SkipTest("the extra minari is not installed")
@@ -23,6 +18,7 @@ from minari import data_collector
 
 from lfgp_dmc.data import minari_datasets
 from tests import fixtures
+from tests.launch import fixtures as launch_fixtures
 
 
 class MinariTest(fixtures.FolderTest):
@@ -79,33 +75,15 @@ class MinariTest(fixtures.FolderTest):
     ours = self.folder / "ours"
     ours.mkdir()
     demonstrations.write(ours / "reach.hdf5", fixtures.demonstrations(4, 1, 6))
-    script = pathlib.Path(command.__file__).with_name("convert_minari.py")
     for arguments, said in (
-      (["--dataset=ours", "--minari=lfgp_dmc/b"], "lfgp_dmc/b/reach-v0"),
-      (
-        [
-          "--dataset=new",
-          "--minari=lfgp_dmc/b",
-          "--back",
-          "--attributes=expert=me,seed=9",
-        ],
-        "new/reach.hdf5",
-      ),
+      ("--dataset=ours", "lfgp_dmc/b/reach-v0"),
+      ("--dataset=new --back --attributes=expert=me,seed=9", "new/reach.hdf5"),
     ):
-      done = subprocess.run(
-        [sys.executable, script, *arguments],
-        cwd=self.folder,
-        capture_output=True,
-        text=True,
-        check=False,
-      )
+      line = f"convert_minari.py --minari=lfgp_dmc/b {arguments}"
+      done = launch_fixtures.call(line, self.folder)
       self.assertEqual(done.returncode, 0, done.stderr)
       self.assertIn(said, done.stdout)
     back = demonstrations.read(self.folder / "new" / "reach.hdf5", "reach")
     self.assertLen(back, 11)
     self.assertEqual((back.attributes["expert"], back.attributes["seed"]),
                      ("me", 9))  # fmt: skip
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -1,7 +1,6 @@
 """Videos are files that other programs read."""
 
 import json
-import pathlib
 
 import imageio.v2 as imageio
 import numpy as np
@@ -9,6 +8,7 @@ from absl.testing import absltest, parameterized
 
 from lfgp_dmc.pictures import film_strips, video
 from lfgp_dmc.pictures.recorder import Clip, Look
+from tests.fixtures import FolderTest
 
 
 def _frames(count=8, height=47, width=63):
@@ -18,14 +18,10 @@ def _frames(count=8, height=47, width=63):
   return list(frames)
 
 
-class VideoTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    self._folder = pathlib.Path(self.create_tempdir().full_path)
-
+class VideoTest(FolderTest):
   @parameterized.parameters("clip.mp4", "clip.gif")
   def test_clip_plays_back(self, name):
-    path = video.write(self._folder / "new" / name, _frames(), 20, {"seed": 3})
+    path = video.write(self.folder / "new" / name, _frames(), 20, {"seed": 3})
     read = imageio.mimread(path)
     self.assertLen(read, 8)
     self.assertLess(np.abs(read[4][20, 24, :3] - [250.0, 80, 20]).max(), 60)
@@ -35,7 +31,7 @@ class VideoTest(parameterized.TestCase):
 
   def test_a_strip_of_frames(self):
     frames = video.film_strip(_frames(), 3)
-    path = video.write(self._folder / "strip.png", frames)
+    path = video.write(self.folder / "strip.png", frames)
     self.assertEqual(imageio.imread(path).shape, (47, 3 * 63, 3))
 
   def test_a_grid_of_clips(self):
@@ -64,8 +60,8 @@ class VideoTest(parameterized.TestCase):
       ("a.mp4", [frames[0], frames[0][1:]], "two sizes"),
     ):
       with self.assertRaisesRegex(ValueError, message):
-        video.write(self._folder / name, bad)
-    self.assertEmpty(list(self._folder.iterdir()))
+        video.write(self.folder / name, bad)
+    self.assertEmpty(list(self.folder.iterdir()))
 
 
 class FilmStripTest(absltest.TestCase):
@@ -79,7 +75,3 @@ class FilmStripTest(absltest.TestCase):
     self.assertEqual(found, ([0, 8, 16, 24], 7, 12))
     with self.assertRaisesRegex(ValueError, "no success of lift in 2 episodes"):
       film_strips.row(play, "lift", range(2), Look(), 4)
-
-
-if __name__ == "__main__":
-  absltest.main()

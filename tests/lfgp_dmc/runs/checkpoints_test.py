@@ -4,7 +4,7 @@ import pathlib
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc.runs import checkpoints, pytree
 from tests import fixtures
@@ -106,7 +106,3 @@ class CheckpointsTest(fixtures.FolderTest):
   def test_what_cannot_be_stored_is_named(self):
     with self.assertRaisesRegex(TypeError, "'agent/0' is a set"):
       pytree.pack({"agent": [set()]})
-
-
-if __name__ == "__main__":
-  absltest.main()

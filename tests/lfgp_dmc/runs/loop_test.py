@@ -4,7 +4,6 @@ import os
 import signal
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
@@ -57,15 +56,17 @@ class LoopTest(fixtures.FolderTest):
       "progress_bar": False,
     } | schedule
     self._replay = Replay(1000, 2, 2, reward_tasks=toy.TASKS)
-    return loop.train(
+    rounds = loop.EpisodeRounds(
       environment or toy.PointEnvironment(),
       agent,
       self._replay,
       TrainSchedule(**options),
       MetricsLog(self.folder),
+      progress,
+    )
+    return rounds.run(
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.update)),
-      progress=progress,
     )
 
   def _rows(self):
@@ -159,7 +160,3 @@ class LoopTest(fixtures.FolderTest):
   def test_a_bad_schedule_names_its_field(self):
     with self.assertRaisesRegex(ValueError, "log_every is 0"):
       TrainSchedule(env_steps=1, log_every=0)
-
-
-if __name__ == "__main__":
-  absltest.main()

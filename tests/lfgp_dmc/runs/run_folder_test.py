@@ -2,7 +2,6 @@
 
 import datetime
 
-from absl.testing import absltest
 from tensorboard.backend.event_processing import event_accumulator
 
 from lfgp_dmc.data import csv_files, files
@@ -127,7 +126,3 @@ class RunFolderTest(fixtures.FolderTest):
     first.mkdir()
     second = run_folder.default_path("lfgp", "stack", self.folder, now)
     self.assertEqual(second.name, "20220131_120005_lfgp_stack_2")
-
-
-if __name__ == "__main__":
-  absltest.main()

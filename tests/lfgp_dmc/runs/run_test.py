@@ -5,17 +5,14 @@ import shutil
 from unittest import mock
 
 import numpy as np
-from absl.testing import absltest
 
 from lfgp_dmc import toy
-from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import checkpoints, run, run_folder
 from lfgp_dmc.runs.schedule import TrainSchedule
 from tests import fixtures
 
-_RATES = ("wall_s", "steps_per_s", "updates_per_s")
 _CONFIG = {"seed": 3}
 
 
@@ -101,9 +98,8 @@ class ResumingTest(fixtures.FolderTest):
     return path
 
   def _numbers(self, path: pathlib.Path):
-    rows = csv_files.read(path / "metrics.csv")[1]
-    kept = [{k: v for k, v in row.items() if k not in _RATES} for row in rows]
-    return kept, (path / "evaluation.csv").read_text()
+    rows = fixtures.rows(path / "metrics.csv")
+    return rows, (path / "evaluation.csv").read_text()
 
   def setUp(self):
     super().setUp()
@@ -179,7 +175,3 @@ class ResumingTest(fixtures.FolderTest):
   def test_a_finished_run_resumes_to_nothing(self):
     self._run(self.folder / "whole", resume=True)
     self.assertEqual(self._numbers(self.folder / "whole"), self._whole)
-
-
-if __name__ == "__main__":
-  absltest.main()

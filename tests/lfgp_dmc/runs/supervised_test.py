@@ -3,8 +3,6 @@
 import os
 import signal
 
-from absl.testing import absltest
-
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.runs import supervised
 from lfgp_dmc.runs.metrics import MetricsLog
@@ -53,13 +51,10 @@ class SupervisedTest(fixtures.FolderTest):
       "checkpoint_every": 35,
       "progress_bar": False,
     } | schedule
-    return supervised.train(
-      agent,
-      TrainSchedule(**options),
-      MetricsLog(self.folder),
+    schedule, log = TrainSchedule(**options), MetricsLog(self.folder)
+    return supervised.EpochRounds(agent, schedule, log, progress).run(
       lambda step: self._evaluated.append(step) or {"right": 0.5},
       lambda at: self._saved.append((at.env_step, at.is_complete)),
-      progress=progress,
     )
 
   def _steps(self):
@@ -110,7 +105,3 @@ class SupervisedTest(fixtures.FolderTest):
   def test_may_evaluate_first(self):
     self._train(_Agent(converges_after=1), evaluate_first=True)
     self.assertEqual(self._evaluated, [0, 10])
-
-
-if __name__ == "__main__":
-  absltest.main()

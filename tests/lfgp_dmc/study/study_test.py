@@ -1,7 +1,6 @@
 """Statistics and figures of a study, from runs written here."""
 
 import json
-import pathlib
 
 import imageio.v2 as imageio
 import numpy as np
@@ -10,6 +9,7 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.study import figures, run_results, statistics
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
+from tests.fixtures import FolderTest
 
 
 def _scores(*tasks):
@@ -37,24 +37,8 @@ class StatisticsTest(absltest.TestCase):
     found = statistics.interquartile_mean(np.full((1, 1, 3), 0.25))
     np.testing.assert_allclose(found, np.full((3, 3), 0.25))
 
-  def test_probability_of_improvement(self):
-    # First task: 3 wins of 4 pairs; second: 4 ties.
-    found = statistics.probability_of_improvement(
-      _scores([1, 3], [1, 1]), _scores([2, 0], [1, 1])
-    )
-    # Resamples of the first task range from (1, 1) against (2, 2) to all wins.
-    np.testing.assert_allclose(found, [[0.625], [0.25], [0.75]])
-    better = statistics.probability_of_improvement(
-      _scores([3, 4, 5]), _scores([1, 2])
-    )
-    np.testing.assert_allclose(better, [[1.0], [1.0], [1.0]])
 
-
-class StudyTest(parameterized.TestCase):
-  def setUp(self):
-    super().setUp()
-    self.folder = pathlib.Path(self.create_tempdir().full_path)
-
+class StudyTest(FolderTest):
   def _write(self, algorithm, main_task, seed, scores, **config):
     """A run with `env_step -> successes of 4 episodes`, alike in all tasks."""
     path = self.folder / f"{algorithm}_{main_task}_{seed}{len(config)}"
@@ -173,7 +157,3 @@ class StudyTest(parameterized.TestCase):
     run = run_results.Run("dac", "swing", 0, self.folder, [row])
     with self.assertRaisesRegex(ValueError, "no success in the evaluations of"):
       figures.learning_curve([run], self.folder / "a.png")
-
-
-if __name__ == "__main__":
-  absltest.main()

@@ -4,7 +4,7 @@ import functools
 import pickle
 
 import numpy as np
-from absl.testing import absltest, parameterized
+from absl.testing import parameterized
 
 from lfgp_dmc import flatten, seeding
 from lfgp_dmc.task_names import ALL_TASKS
@@ -138,16 +138,9 @@ class PlayStatesTest(parameterized.TestCase):
   @parameterized.parameters("reach", "lift")
   def test_blocks_touching_along_y(self, task):
     self._check(
-      task,
-      tcp=(0.0, 0.5, 0.2),
-      blue=pose(0.0, 0.48),
-      green=pose(0.005, 0.5202),
+      task, tcp=(0.0, 0.5, 0.2), blue=pose(0.0, 0.48), green=pose(0.005, 0.5202)
     )
 
   def _check(self, task, **start):
     env = environment()
     self.assertTrue(_run(env, task, env.reset_to(**start))[0])
-
-
-if __name__ == "__main__":
-  absltest.main()
