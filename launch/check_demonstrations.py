@@ -22,11 +22,13 @@ from lfgp_dmc.data import demonstration_report, demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.launch.environment_spec import EnvironmentSpec, tasks_of
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.pictures import film_strips, recorder, video
 
 _DATASET = flags.DEFINE_string("dataset", "", "The dataset's folder.")
-_TASK = flags.DEFINE_string("task", "", "The main task; default: any.")
+_TASK = flags.DEFINE_string(
+  "task", "", "The main task, of the block tasks; default: any."
+)
 _ENVIRONMENT = flags.DEFINE_string(
   "environment", "", "As config.environment; default: the block tasks."
 )
@@ -79,9 +81,7 @@ def _expected(folder: pathlib.Path) -> tuple[tuple[str, ...], tuple[int, int]]:
     environment = EnvironmentSpec(task, _ENVIRONMENT.value).build()
   with contextlib.closing(environment):
     widths = environments.widths(environment)
-    if _TASK.value and _ENVIRONMENT.value:
-      return tasks_of(environment, task), widths
-  if _TASK.value:
+  if _TASK.value and not _ENVIRONMENT.value:
     return lfgp_dmc.task_set(task), widths
   tasks = tuple(
     path.stem
