@@ -100,6 +100,8 @@ def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
     ) from None
   except ValueError as error:
     raise ValueError(f"config.transfer_from: {error}") from None
-  agent.carry_over(networks, tasks, config.transfer_updates)
+  agent.carry_over(
+    networks, tasks, config.transfer_updates, config.transfer_main_head
+  )
   rows = replay.copy_from(Replay.stored(source.replay))
   print(f"took over {path.name} of {source.path} with {rows} transitions")

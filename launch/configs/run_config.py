@@ -54,6 +54,8 @@ class RunConfig:
   # taken over. Of the second, a policy folder: its intentions alone.
   transfer_from: Text = ""
   transfer_updates: Count = 1000  # before the first step, if a task is new
+  # The other main task's heads become ours (released: Stack -> Unstack-Stack).
+  transfer_main_head: Switch = False
   init_from: Text = ""
 
   # When things happen.
