@@ -14,6 +14,14 @@ if TYPE_CHECKING:
 
 __all__ = ["load"]
 
+_CHOICES = {
+  "reward": ("sparse", "dense"),
+  "observations": ("features", "vision"),
+  "spawn": ("published", "full_tray"),
+  "control_hz": CONTROL_RATES,
+  "show_rewards": (False, True),
+}
+
 
 def load(
   task: str,
@@ -57,11 +65,8 @@ def load(
   if unknown:
     valid = ", ".join(load.__kwdefaults__ or ())
     raise ValueError(f"unknown option {', '.join(unknown)}; valid: {valid}")
-  _check("reward", reward, ("sparse", "dense"))
-  _check("observations", observations, ("features", "vision"))
-  _check("spawn", spawn, ("published", "full_tray"))
-  _check("control_hz", control_hz, CONTROL_RATES)
-  _check("show_rewards", show_rewards, (False, True))
+  for name, choices in _CHOICES.items():
+    _check(name, given[name], choices)
   if observations == "vision" and (fault := graphics.fault()):
     raise ValueError(fault)
   if not time_limit * control_hz >= 1:
