@@ -47,8 +47,7 @@ def load(
     spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
     control_hz: 20, 10 or 5 control steps a second.
     time_limit: length of an episode, s.
-    show_rewards: whether every task's dense reward is observed, as
-      `reward/<task>`.
+    show_rewards: whether `reward/<task>`, dense, are observed for all tasks.
     **unknown: refused, with the options that there are.
 
   Raises:
