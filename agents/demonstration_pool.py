@@ -63,8 +63,9 @@ class ExpertPool:
     demonstrations: Mapping[str, Demonstrations],
     tasks: Sequence[str],
     standardiser: Standardiser,
+    final_rows: int = 1,
   ):
-    """Copies the demonstrations.
+    """Copies the demonstrations; so many last rows of an attempt are finals.
 
     Raises:
       ValueError: a task has no demonstrations.
@@ -83,7 +84,7 @@ class ExpertPool:
     )
     self._standardiser = standardiser
     self._tasks = tuple(tasks)
-    last = [part.is_last for part in parts]
+    last = [_last_rows(part, final_rows) for part in parts]
     self._all = _Rows([np.ones_like(part) for part in last])
     self._finals = _Rows(last)
     # A task that has nothing but rows of success draws from them throughout.
@@ -167,3 +168,12 @@ class _Rows:
     size = None if columns is None else (len(task), columns)
     within = generator.integers(self.sizes[task], size=size)
     return self._rows[self._starts[task] + within]
+
+
+def _last_rows(part: Demonstrations, count: int) -> np.ndarray:
+  """The last `count` rows of every whole attempt, bool [N]."""
+  chosen = part.is_last.copy()
+  for _ in range(count - 1):
+    same = part.episode[1:] == part.episode[:-1]
+    chosen[:-1] |= chosen[1:] & same
+  return chosen

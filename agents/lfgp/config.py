@@ -120,6 +120,8 @@ class PriorConfig:
   distance: Literal["squared_error", "divergence"] = "squared_error"
   normalise: Switch = False  # times each task's mean |Q|
   decay: Share = 1.0  # factor on the weight, an update
+  # Only on rows where the critics prefer its action (Nair et al., 2018).
+  q_filter: Switch = False
 
 
 @checked
@@ -127,6 +129,7 @@ class LfgpConfig:
   """LfGP; LfGP-NS, DAC and SAC-X are settings of it."""
 
   batch_size: PositiveInt = 256
+  final_rows: PositiveInt = 1  # last rows of an attempt that are of success
   inputs: InputsConfig = InputsConfig()
   networks: LfgpNetworksConfig = LfgpNetworksConfig()
   optimiser: OptimiserConfig = OptimiserConfig()

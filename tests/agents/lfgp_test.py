@@ -132,6 +132,20 @@ class BatchTest(absltest.TestCase):
       found = fixtures.among(expert.inputs[index], finals)
       self.assertEqual(found, [False] * 16 + [True] * 16)
 
+  def test_the_last_rows_of_a_whole_attempt_are_of_success(self):
+    shown = fixtures.demonstrations()
+    cut = shown["reach"].is_last
+    cut[-1] = False  # the last attempt has no end
+    agent = make_agent(
+      shown=shown, **{"final_rows": 3, "reward.final_share": 1.0}
+    )
+    for index, part in enumerate(shown.values()):
+      ends = np.flatnonzero(part.is_last)
+      held = part.observation[np.concatenate([ends - i for i in range(3)])]
+      drawn = [agent.batches.draw(0).expert.inputs[index] for _ in range(9)]
+      self.assertTrue(all(fixtures.among(torch.cat(drawn), held)))
+      self.assertLen(torch.cat(drawn).unique(dim=0), len(held))
+
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
     share = {"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}
     agent = make_agent(**share)
