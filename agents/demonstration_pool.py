@@ -123,10 +123,10 @@ class ExpertPool:
     return ExpertBatch(self._inputs[at], self._action[at])
 
   def sample_transitions(
-    self, generator: np.random.Generator, rows: int
+    self, generator: np.random.Generator, rows: int, main_share: float = 0.0
   ) -> Batch:
     """Draws `rows` transitions, of tasks as by `split`."""
-    at = self._all.draw(generator, self.split(rows))
+    at = self._all.draw(generator, self.split(rows, main_share))
     index = torch.from_numpy(at).to(self._device)
     return Batch(
       self._inputs[index], self._action[index], self._next_inputs[index]
@@ -142,11 +142,17 @@ class ExpertPool:
     at = torch.from_numpy(self._finals.draw(generator, task)).to(self._device)
     return self._next_inputs[at], self._action[at]
 
-  def split(self, rows: int) -> np.ndarray:
-    """The task of each of `rows` rows: equal shares, the rest the main's."""
+  def split(self, rows: int, main_share: float = 0.0) -> np.ndarray:
+    """The task of each of `rows` rows: equal shares, the rest the main's.
+
+    With a share of its own, the main task has that first.
+    """
     tasks = len(self._tasks)
-    counts = np.full(tasks, rows // tasks)
-    counts[0] += rows % tasks
+    others = rows // tasks
+    if main_share and tasks > 1:
+      others = (rows - int(main_share * rows)) // (tasks - 1)
+    counts = np.full(tasks, others)
+    counts[0] = rows - others * (tasks - 1)
     return np.repeat(np.arange(tasks), counts)
 
 

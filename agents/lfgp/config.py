@@ -78,6 +78,8 @@ class DiscriminatorReward:
   # Expert rows among those of critics and intentions.
   expert_share: Share = 0.0
   expert_share_decay: Share = 1.0  # factor an update
+  main_expert_share: Share = 0.0  # of these, the main task's; 0: an equal one
+  intentions_on_experts: Switch = True  # or critics alone learn from them
 
 
 @checked

@@ -1,6 +1,7 @@
 """The LfGP agent on synthetic data: learning, determinism, resuming."""
 
 import math
+from unittest import mock
 
 import numpy as np
 import torch
@@ -123,6 +124,25 @@ class BatchTest(absltest.TestCase):
     due = [agent.batches.draw(update).policy for update in range(7)]
     self.assertEqual([batch is not None for batch in due],
                      [True, False, False] * 2 + [True])  # fmt: skip
+
+  def test_the_main_task_may_have_a_share_of_its_own(self):
+    agent = make_agent()
+    split = agent.batches._pool.split
+    for share, counts in ((0.0, [12, 10, 10]), (0.5, [16, 8, 8])):
+      task = split(32, share)
+      self.assertEqual(np.bincount(task).tolist(), counts)
+
+  def test_intentions_may_leave_expert_rows_to_the_critics(self):
+    share = {"reward.expert_share": 0.25}
+    self.assertIsNone(make_agent(**share).batches.draw(0).replayed)
+    agent = make_agent(**share, **{"reward.intentions_on_experts": False})
+    draw = agent.batches.draw(0)
+    self.assertTrue(draw.batch.inputs[:24].equal(draw.replayed.inputs))
+    with mock.patch.object(
+      agent.learner.intentions, "update", return_value={}
+    ) as update:
+      agent.learner.update(draw)
+    self.assertIs(update.call_args.args[0], draw.replayed.inputs)
 
   def test_rows_of_success_come_last_and_in_their_share(self):
     agent = make_agent(**{"reward.final_share": 0.5})

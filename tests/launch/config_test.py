@@ -206,7 +206,7 @@ class FlagfilesTest(parameterized.TestCase):
     for algorithm in configs.ALGORITHMS:
       config = resolve(f"--flagfile={_FLAGS / algorithm}.flags")
       self.assertEqual(config.algorithm, algorithm)
-    self.assertLessEqual(len(list(_FLAGS.iterdir())), 15)
+    self.assertLessEqual(len(list(_FLAGS.iterdir())), 16)
 
   @parameterized.parameters(
     ("stack", "move_object"),
