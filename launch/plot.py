@@ -1,8 +1,12 @@
 """Draws figures from the CSV files of runs.
 
+  python launch/plot.py --run=runs/stack_1
   python launch/plot.py --runs=runs/stack_1,runs/stack_2 --output=results
   python launch/plot.py --figure=main --runs=runs/paper --output=results
 
+--run shows what one run has logged, also while it trains: success by task,
+rewards, Q, discriminators' accuracies, temperatures. The picture goes into the
+run's folder, where training leaves it at its end too. --runs compares runs:
 --figure=runs draws every task of each algorithm and main task; its other
 values are the paper's: main (all methods), multitask (every task of the
 multitask methods), transfer and play. There --estimate=mean draws mean and
@@ -18,14 +22,17 @@ import pathlib
 from absl import flags
 
 from lfgp_dmc.launch import command
-from lfgp_dmc.study import figures, run_results, statistics
+from lfgp_dmc.study import figures, run_picture, run_results, statistics
 
 _EACH, _BOTH = "runs", "both"
 
+_RUN = flags.DEFINE_string("run", "", "A run's folder, drawn alone.")
 _RUNS = flags.DEFINE_list(
   "runs", [], "Folders of runs, folders of such folders, or patterns of either."
 )
-_OUTPUT = flags.DEFINE_string("output", "results", "Folder for the figures.")
+_OUTPUT = flags.DEFINE_string(
+  "output", "", "Folder for the figures; default: results, or that of --run."
+)
 _FIGURE = flags.DEFINE_enum(
   "figure", _EACH, [_EACH, *figures.FIGURES], "Which figure; see above."
 )
@@ -42,13 +49,30 @@ _FORMAT = flags.DEFINE_enum(
 
 def main() -> None:
   """Draws, and lists the runs that a figure lacks."""
-  if not _RUNS.value:
-    raise command.UserError("--runs is missing: give the folders of runs")
+  if bool(_RUN.value) == bool(_RUNS.value):
+    raise command.UserError("give one of --run=FOLDER and --runs=FOLDER,...")
+  if _RUN.value:
+    _draw_one()
+    return
   with command.checked_input():
     runs, notes = run_results.read_runs(_RUNS.value)
     notes += _draw_each(runs) if _FIGURE.value == _EACH else _draw_study(runs)
   for note in dict.fromkeys(notes):
     print(f"note: {note}")
+
+
+def _draw_one() -> None:
+  """What one run has logged."""
+  for flag in (_FIGURE, _QUANTITY, _ESTIMATE):
+    if flag.present:
+      raise command.UserError(f"--{flag.name} goes with --runs, not with --run")
+  folder = pathlib.Path(_RUN.value)
+  path = (folder / run_picture.NAME).with_suffix(f".{_FORMAT.value}")
+  if _OUTPUT.value:
+    path = _path(folder.resolve().name)
+  with command.checked_input():
+    run_picture.draw(folder, path)
+  print(path)
 
 
 def _draw_each(runs: list[run_results.Run]) -> list[str]:
@@ -74,7 +98,8 @@ def _draw_study(runs: list[run_results.Run]) -> list[str]:
 
 
 def _path(*words: str) -> pathlib.Path:
-  return pathlib.Path(_OUTPUT.value) / f"{'_'.join(words)}.{_FORMAT.value}"
+  folder = pathlib.Path(_OUTPUT.value or "results")
+  return folder / f"{'_'.join(words)}.{_FORMAT.value}"
 
 
 cli = functools.partial(command.run, main)

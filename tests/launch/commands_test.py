@@ -77,6 +77,7 @@ class BlockRunTest(absltest.TestCase):
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 400 environment steps", done.stdout)
     self.assertIn("policy       runs/tiny/policy.safetensors", done.stdout)
+    self.assertTrue((self.path / "learning_curve.png").exists())
 
   def test_evaluates_the_run_and_refuses_to_overwrite(self):
     line = "evaluate.py --run=runs/tiny --episodes=2 --workers=1 --output=out"
@@ -118,6 +119,9 @@ class BlockRunTest(absltest.TestCase):
     done = self._call("plot.py --runs=runs/tiny --output=figures")
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertTrue((self.folder / "figures/lfgp_bring_success.png").exists())
+    done = self._call("plot.py --run=runs/tiny --output=figures --format=svg")
+    self.assertEqual(done.stdout, "figures/tiny.svg\n")
+    self.assertIn("<svg", (self.folder / "figures/tiny.svg").read_text())
 
   def test_renders_intention_and_schedule_in_every_format(self):
     if graphics.fault():
