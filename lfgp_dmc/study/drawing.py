@@ -39,11 +39,16 @@ class Style(NamedTuple):
   marker: str = ""
 
 
-def task_styles(tasks: Iterable[str]) -> dict[str, Style]:
-  """A look for each task, in their order."""
+def styles_of(names: Iterable[str]) -> dict[str, Style]:
+  """A look for each name, 49 of them unlike."""
   return {
-    task: Style(task.replace("_", " "), COLOURS[i % 7], "-", _MARKERS[i % 7])
-    for i, task in enumerate(tasks)
+    name: Style(
+      name.replace("_", " "),
+      COLOURS[i % 7],
+      "--" if i // 7 % 2 else "-",
+      _MARKERS[(i + i // 7) % 7],
+    )
+    for i, name in enumerate(names)
   }
 
 
@@ -71,11 +76,8 @@ def figure(
   present = {method for _, method in lines}
   styles = {name: style for name, style in styles.items() if name in present}
   columns = max(map(len, cells))
-  drawn = matplotlib.figure.Figure(
-    (columns * size[0], len(cells) * size[1] + 0.6), layout="constrained"
-  )
   is_share = quantity == run_results.SUCCESS
-  grid = drawn.subplots(len(cells), columns, squeeze=False, sharey=is_share)
+  drawn, grid = panels(len(cells), columns, size, is_share)
   handles: dict[str, Any] = {}
   for row, row_cells in zip(grid, cells, strict=True):
     for axes, cell in zip(row, row_cells, strict=False):
@@ -83,16 +85,27 @@ def figure(
         if (cell, method) in lines:
           draw = _line if end else _bar
           handles[method] = draw(axes, style, *lines[cell, method], end or i)
-      finish(axes, _title(cell[1]), end, is_share)
+      finish(axes, task_title(cell[1]), end, is_share)
     for axes in row[len(row_cells) :]:
       axes.set_visible(False)
-    main_task = f"{_title(row_cells[0][0])}\n" if len(cells) > 1 else ""
+    main_task = f"{task_title(row_cells[0][0])}\n" if len(cells) > 1 else ""
     row[0].set_ylabel(main_task + _UNITS[quantity], fontsize=9)
   counts = sorted(len(curve.scores) for curve, _ in lines.values())
   seeds = " to ".join(map(str, dict.fromkeys((counts[0], counts[-1]))))
   caption = f"{_CAPTIONS[kind]} across {seeds} seeds"
   legend(drawn, handles, styles, caption if counts[-1] > 1 else "one seed")
   return drawn
+
+
+def panels(
+  rows: int, columns: int, size: tuple[float, float], sharey: bool = False
+) -> tuple[matplotlib.figure.Figure, np.ndarray]:
+  """A figure and its axes, [rows, columns], with room for a legend below."""
+  width, height = size
+  drawn = matplotlib.figure.Figure(
+    (columns * width, rows * height + 0.6), layout="constrained"
+  )
+  return drawn, drawn.subplots(rows, columns, squeeze=False, sharey=sharey)
 
 
 def legend(
@@ -173,5 +186,6 @@ def finish(
     axes.margins(x=0.12)
 
 
-def _title(task: str) -> str:
+def task_title(task: str) -> str:
+  """A task's name for people."""
   return "all four" if task == "all" else task.replace("_", "-").title()

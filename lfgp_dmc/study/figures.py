@@ -123,7 +123,7 @@ def learning_curve(
   if not lines:
     paths = ", ".join(str(run.path) for run in runs)
     raise ValueError(f"no {quantity} in the evaluations of {paths}")
-  styles, size = drawing.task_styles(tasks), (7.0, 4.0)
+  styles, size = drawing.styles_of(tasks), (7.0, 4.0)
   drawn = drawing.figure([[cell]], lines, styles, quantity, "mean", size)
   drawn.suptitle(f"{method} on {main_task}".replace("_", " "), fontsize=11)
   drawing.save(drawn, output)

@@ -6,7 +6,6 @@ import pathlib
 from collections import defaultdict
 from typing import Any, NamedTuple
 
-import matplotlib.figure
 import numpy as np
 
 from lfgp_dmc.data import csv_files, evaluation_csv, files
@@ -66,11 +65,15 @@ def draw(path: files.Path, output: files.Path) -> None:
     )
   shown = [logged[panel.name] for panel in panels]
   end = max(line[-1][0] for curves in shown for line in curves.values())
-  styles = drawing.task_styles(dict.fromkeys(itertools.chain(*shown)))
+  styles = drawing.styles_of(dict.fromkeys(itertools.chain(*shown)))
   algorithm, main_task = config.get("algorithm"), config.get("main_task")
   is_cloning = algorithm in run_results.WITHOUT_STEPS
   unit = "updates" if is_cloning else drawing.STEPS
-  drawn, grid = _grid(len(panels))
+  rows = 1 if len(panels) < 4 else 2
+  columns = max(2, -(-len(panels) // rows))  # room for the title
+  drawn, grid = drawing.panels(rows, columns, _SIZE)
+  for axes in grid.flat[len(panels) :]:
+    axes.set_visible(False)
   handles = {}
   for axes, panel, curves in zip(grid.flat, panels, shown, strict=False):
     for task, points in curves.items():
@@ -86,19 +89,6 @@ def draw(path: files.Path, output: files.Path) -> None:
   title += f"seed {config.get('seed')}"
   drawn.suptitle(title, fontsize=11, parse_math=False)
   drawing.save(drawn, output)
-
-
-def _grid(panels: int) -> tuple[matplotlib.figure.Figure, np.ndarray]:
-  """As many axes as panels."""
-  rows = 1 if panels < 4 else 2
-  columns = max(2, -(-panels // rows))  # room for the title
-  drawn = matplotlib.figure.Figure(
-    (columns * _SIZE[0], rows * _SIZE[1] + 0.8), layout="constrained"
-  )
-  grid = drawn.subplots(rows, columns, squeeze=False)
-  for axes in grid.flat[panels:]:
-    axes.set_visible(False)
-  return drawn, grid
 
 
 def _logged(path: pathlib.Path) -> dict[str, Curves]:

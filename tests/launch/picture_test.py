@@ -53,9 +53,7 @@ class PictureTest(fixtures.RunTest):
   def test_training_does_not_fail_with_its_picture(self):
     run, _ = self.train(self.config(env_steps=60))
     with (
-      mock.patch.object(
-        drawing, "task_styles", side_effect=RuntimeError("ink")
-      ),
+      mock.patch.object(drawing, "styles_of", side_effect=RuntimeError("ink")),
       self.assertLogs(level="WARNING") as logs,
     ):
       self.assertIsNone(training.draw(run))
