@@ -17,6 +17,7 @@ import pathlib
 
 from absl import flags
 
+from lfgp_dmc.data import files
 from lfgp_dmc.launch import command
 from lfgp_dmc.study import figures, run_results, statistics
 
@@ -44,6 +45,7 @@ def main() -> None:
   """Draws, and lists the runs that a figure lacks."""
   if not _RUNS.value:
     raise command.UserError("--runs is missing: give the folders of runs")
+  files.check_writable(_path("figure"))
   with command.checked_input():
     runs, notes = run_results.read_runs(_RUNS.value)
     notes += _draw_each(runs) if _FIGURE.value == _EACH else _draw_study(runs)

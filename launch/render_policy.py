@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from absl import flags
 
 import lfgp_dmc
+from lfgp_dmc.data import files
 from lfgp_dmc.launch import clips, command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.pictures import film_strips, recorder, video
@@ -196,8 +197,10 @@ def _output(
     raise UserError(
       f"--output={output}: unknown format; valid: {', '.join(formats)}"
     )
-  if output.exists():
-    raise UserError(f"{output} exists; choose another --output")
+  for path in (output, video.sidecar(output)):
+    if path.exists():
+      raise UserError(f"{path} exists; choose another --output")
+    files.check_writable(path)
   return output
 
 

@@ -1,19 +1,28 @@
 """Trains by a config, in a run's folder: new, or continued."""
 
+import dataclasses
+import hashlib
 import pathlib
 import shutil
 from typing import Any
 
+import numpy as np
+
 from lfgp_dmc.agents.lfgp import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, command
+from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
+
+# What bad input raises while a run is made.
+_INPUT = (ValueError, OSError, MemoryError, OverflowError)
 
 
 def train(
@@ -31,6 +40,8 @@ def train(
     raise UserError(
       f"{path} exists; continue it with --resume, or choose another --run"
     )
+  sizes.check(config, path)
+  files.check_writable(path / run_folder.CONFIG_NAME)
   parts = assemble.make_parts(config)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
@@ -38,6 +49,7 @@ def train(
       f"demonstrations: {config.demonstrations}, {len(found)} tasks, "
       f"{pairs} pairs"
     )
+    config = dataclasses.replace(config, demonstrations_sha256=_sha256(found))
   with command.checked_input():
     if resume:
       folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
@@ -47,11 +59,23 @@ def train(
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
       _initialise(config, run.agent, run.replay)
-  except (ValueError, OSError) as error:
+  except BaseException as error:
     if not resume:  # it cannot start: as if it had not been tried
       shutil.rmtree(path)
-    raise UserError(str(error)) from error
+    if isinstance(error, _INPUT) or "allocate" in str(error):  # torch
+      raise UserError(str(error)) from error
+    raise
   return run.train()
+
+
+def _sha256(found: dict[str, Demonstrations]) -> str:
+  """Of all arrays, wherever they lie."""
+  digest = hashlib.sha256()
+  for task, data in found.items():
+    for name, array in data.arrays().items():
+      digest.update(f"{task} {name} {array.shape}".encode())
+      digest.update(np.ascontiguousarray(array).data)
+  return digest.hexdigest()
 
 
 def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:

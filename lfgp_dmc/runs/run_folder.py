@@ -8,6 +8,7 @@ import datetime
 import fcntl
 import json
 import pathlib
+import shutil
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -74,8 +75,12 @@ def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
     raise ValueError(
       f"{path} exists; continue it with --resume, or choose another --run"
     ) from None
-  run = RunFolder(path, _locked(path))
-  files.write_json(path / CONFIG_NAME, config)
+  try:
+    run = RunFolder(path, _locked(path))
+    files.write_json(path / CONFIG_NAME, config)
+  except BaseException:
+    shutil.rmtree(path)
+    raise
   return run
 
 
@@ -88,7 +93,8 @@ def resume(
 
   Args:
     path: of the run.
-    config: of the command; it must equal the run's own.
+    config: of the command; it must equal the run's own, except for more
+      steps, another number of workers, and where the same demonstrations are.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
@@ -126,7 +132,9 @@ def read_config(path: files.Path) -> dict[str, Any]:
     config = files.read_json(path / CONFIG_NAME)
   except ValueError as error:
     raise ValueError(str(error)) from None
-  if not isinstance(config, dict):
+  if not isinstance(config, dict) or not isinstance(
+    config.get(POLICY_FIELD, {}), dict
+  ):
     raise ValueError(f"{path / CONFIG_NAME} holds no config")
   return config
 
@@ -134,7 +142,7 @@ def read_config(path: files.Path) -> dict[str, Any]:
 def _differing_fields(
   known: Mapping[str, Any], given: Mapping[str, Any]
 ) -> list[str]:
-  """What differs between two configs: `agent.xi (45, now 90)`, ..."""
+  """What differs and may not: `agent.xi (45, now 90)`, ..."""
   # As JSON, so that tuples equal lists.
   first, second = (
     {name: json.dumps(value) for name, value in pytree.flattened(config)}
@@ -145,14 +153,24 @@ def _differing_fields(
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names
     if first.get(name) != second.get(name)
+    and not _may_change(name, known.get(name), given.get(name))
   ]
+
+
+def _may_change(name: str, old: Any, new: Any) -> bool:
+  if name == "env_steps":
+    return new > old
+  if name == "demonstrations_sha256":
+    return not old  # the run is older than the field
+  return name in ("demonstrations", "evaluation_workers")
 
 
 def _locked(path: pathlib.Path):
   """An open file whose lock the system releases however the process ends."""
   file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
   try:
-    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    with files.naming(file.name):  # some file systems have no locks
+      fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
   except BlockingIOError:
     file.close()
     raise ValueError(

@@ -20,6 +20,14 @@ class FilesTest(fixtures.FolderTest):
     self.assertEqual(files.read_json(path), {"kept": 1})
     self.assertLen(list(self.folder.iterdir()), 1)
 
+  def test_a_full_disk_names_the_file(self):
+    path = self.folder / "a.csv"
+    csv_files.write(path, ["env_step"], [{"env_step": 1}])
+    many = [{"env_step": 10**9}] * 9000
+    for write in (csv_files.write, csv_files.append):
+      with fixtures.full_disk(), self.assertRaisesRegex(OSError, "a.csv"):
+        write(path, ["env_step"], many)
+
   def test_bad_json_is_named(self):
     path = self.folder / "a.json"
     path.write_text("{")
