@@ -103,7 +103,7 @@ class Policy:
     arrays = array_files.read(arrays_path)
     try:
       return cls.from_arrays(arrays, options)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # torch: too large
       raise ValueError(f"{arrays_path}: {error}") from error
 
   def save(

@@ -70,13 +70,12 @@ def resolved(
 def resumed(stored: Mapping[str, Any]) -> configs.RunConfig:
   """A run's config with the given settings over it.
 
-  Where these decide which fields there are, they are taken alone.
+  Where they say which fields there are, they are all of it.
   """
   given = config_flags.get_override_values(flags.FLAGS["config"])
-  is_whole = flags.FLAGS["preset"].present or any(
+  if flags.FLAGS["preset"].present or any(
     name == "algorithm" or name.endswith(configs.KIND) for name in given
-  )
-  if is_whole:
+  ):
     return resolved()
   config = ml_collections.ConfigDict(configs.from_dict(stored).to_dict())
   config.update_from_flattened_dict(given)

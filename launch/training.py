@@ -42,6 +42,11 @@ def train(
     )
   sizes.check(config, path)
   files.check_writable(path / run_folder.CONFIG_NAME)
+  sha256 = config.demonstrations_sha256
+  if resume:
+    with command.checked_input():
+      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
+      sha256 = run_folder.read_config(path).get("demonstrations_sha256")
   parts = assemble.make_parts(config)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
@@ -49,11 +54,15 @@ def train(
       f"demonstrations: {config.demonstrations}, {len(found)} tasks, "
       f"{pairs} pairs"
     )
-    config = dataclasses.replace(config, demonstrations_sha256=_sha256(found))
-  with command.checked_input():
-    if resume:
-      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
-    else:
+    now = _sha256(found)
+    if sha256 not in (now, "", None):  # None: the run is older than the field
+      raise UserError(
+        f"config.demonstrations is {config.demonstrations!r}; valid: the same "
+        f"data that the run was started with (SHA-256 {sha256})"
+      )
+    config = dataclasses.replace(config, demonstrations_sha256=now)
+  if not resume:
+    with command.checked_input():
       folder = run_folder.create(path, config.to_dict())
   try:
     run = assemble.make_run(config, parts, folder, progress_bar)

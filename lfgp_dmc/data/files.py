@@ -89,7 +89,8 @@ def write_bytes(path: Path, content: bytes) -> None:
       aside.write_bytes(content)
   except OSError as error:
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-      error.strerror += f"; it needs {len(content) / 1e6:.3g} MB"
+      size = f"it needs {len(content) / 1e6:.3g} MB"
+      error.strerror = f"{error.strerror}; {size}"
     raise
 
 

@@ -20,6 +20,8 @@ ARRAYS_NAME = "policy.safetensors"
 # Added to the config by the run: the options of the policy's arrays, so that
 # its folder is a policy folder too.
 POLICY_FIELD = "policy"
+# When a run is resumed: neither changes a number, if the data are the same.
+_MAY_CHANGE = ("demonstrations", "demonstrations_sha256", "evaluation_workers")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -94,7 +96,7 @@ def resume(
   Args:
     path: of the run.
     config: of the command; it must equal the run's own, except for more
-      steps, another number of workers, and where the same demonstrations are.
+      steps, another number of workers, and demonstrations elsewhere.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
@@ -153,16 +155,9 @@ def _differing_fields(
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names
     if first.get(name) != second.get(name)
-    and not _may_change(name, known.get(name), given.get(name))
+    and name not in _MAY_CHANGE
+    and not (name == "env_steps" and given[name] > known[name])
   ]
-
-
-def _may_change(name: str, old: Any, new: Any) -> bool:
-  if name == "env_steps":
-    return new > old
-  if name == "demonstrations_sha256":
-    return not old  # the run is older than the field
-  return name in ("demonstrations", "evaluation_workers")
 
 
 def _locked(path: pathlib.Path):

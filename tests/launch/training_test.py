@@ -66,7 +66,9 @@ class TrainingTest(fixtures.RunTest):
     self.train(self.config(env_steps=40))
     shutil.rmtree(self.dataset)
     fixtures.write_dataset(self.dataset, pairs=61)
-    with self.assertRaisesRegex(UserError, "Differing: demonstrations_sha256"):
+    with self.assertRaisesRegex(
+      UserError, "valid: the same data that the run was"
+    ):
       self.train(self.config(env_steps=40), resume=True)
 
   def test_an_existing_folder_is_refused(self):
