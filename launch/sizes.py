@@ -18,13 +18,13 @@ def check(config: configs.RunConfig, folder: files.Path) -> None:
   disk = shutil.disk_usage(files.existing_parent(folder)).total
   width, rows = config.agent.networks.hidden_size, config.replay_capacity
   needs = [
+    ("agent.networks.hidden_size", width, 4 * width**2, memory),
+    ("replay_capacity", rows, 3 * rows, disk),
+  ]
+  needs += [
     (name, value, value * width, memory)
     for name, value in configs.flattened(config.to_dict())
     if name.endswith("batch_size")
-  ]
-  needs += [
-    ("agent.networks.hidden_size", width, 4 * width**2, memory),
-    ("replay_capacity", rows, 3 * rows, disk),
   ]
   for name, value, floats, room in needs:
     if 4 * floats > room:

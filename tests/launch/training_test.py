@@ -54,8 +54,15 @@ class TrainingTest(fixtures.RunTest):
     stored = run_folder.read_config(run)
     self.assertEqual((stored["env_steps"], stored["demonstrations"]),
                      (200, "moved"))  # fmt: skip
-    done = fixtures.call(f"{line} --config.env_steps=100", self.folder)
-    self.assertRegex(done.stderr, r"Differing: env_steps \(200, now 100\)")
+    for flag, said in (
+      ("config.env_steps=100", r"Differing: env_steps \(200, now 100\)"),
+      ("config.agent.scheduler.xi=9", r"Differing: .*xi \(5, now 9\)"),
+      ("config.agent.scheduler.kind=uniform", r"kind \(.*, now .*uniform"),
+      ("config.algorithm=bc", "Differing: algorithm"),
+      ("preset=fast", "agent.prior.weight"),
+    ):
+      done = fixtures.call(f"{line} --{flag}", self.folder)
+      self.assertRegex(done.stderr, rf"\Aerror: runs/a was.*{said}.*\n\Z")
 
   def test_a_ring_that_had_no_slack_resumes_further(self):
     self.train(self.config(env_steps=40, replay_capacity=60))
@@ -89,6 +96,7 @@ class TrainingTest(fixtures.RunTest):
     ({"agent.networks.hidden_size": 10**6}, "hidden_size is 1000000: it needs"),
     ({"agent.networks.hidden_size": 10**12}, "hidden_size is 1000000000000"),
     ({"agent.batch_size": 10**12}, "config.agent.batch_size is 1000000000000"),
+    ({"agent.reward.batch_size": 10**12}, "agent.reward.batch_size is 1000000"),
     ({"replay_capacity": 10**20}, "config.replay_capacity is 1000000000000000"),
     ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
   )

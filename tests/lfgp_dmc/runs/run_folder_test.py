@@ -28,6 +28,13 @@ class FilesTest(fixtures.FolderTest):
       with fixtures.full_disk(), self.assertRaisesRegex(OSError, "a.csv"):
         write(path, ["env_step"], many)
 
+  def test_a_damaged_csv_is_named(self):
+    path = self.folder / "a.csv"
+    for content in (b"env_step\n\xff\n", b"a\n1\n", b"env_step\nx\n"):
+      path.write_bytes(content)
+      with self.assertRaisesRegex(ValueError, "a.csv is"):
+        csv_files.truncate_after(path, 0)
+
   def test_bad_json_is_named(self):
     path = self.folder / "a.json"
     path.write_text("{")
