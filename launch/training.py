@@ -46,7 +46,8 @@ def train(
   if resume:
     with command.checked_input():
       folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
-      sha256 = run_folder.read_config(path).get("demonstrations_sha256")
+      stored = run_folder.read_config(path)
+    sha256 = stored.get("demonstrations_sha256", "")  # none in older runs
   parts = assemble.make_parts(config)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
@@ -54,13 +55,12 @@ def train(
       f"demonstrations: {config.demonstrations}, {len(found)} tasks, "
       f"{pairs} pairs"
     )
-    now = _sha256(found)
-    if sha256 not in (now, "", None):  # None: the run is older than the field
+    config = dataclasses.replace(config, demonstrations_sha256=_sha256(found))
+    if sha256 not in ("", config.demonstrations_sha256):
       raise UserError(
         f"config.demonstrations is {config.demonstrations!r}; valid: the same "
         f"data that the run was started with (SHA-256 {sha256})"
       )
-    config = dataclasses.replace(config, demonstrations_sha256=now)
   if not resume:
     with command.checked_input():
       folder = run_folder.create(path, config.to_dict())
