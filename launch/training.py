@@ -7,6 +7,7 @@ import shutil
 from typing import Any
 
 import numpy as np
+from absl import logging
 
 from lfgp_dmc.agents.lfgp import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
@@ -85,6 +86,19 @@ def _sha256(found: dict[str, Demonstrations]) -> str:
       digest.update(f"{task} {name} {array.shape}".encode())
       digest.update(np.ascontiguousarray(array).data)
   return digest.hexdigest()
+
+
+def draw(path: pathlib.Path) -> pathlib.Path | None:
+  """Draws a run; where that fails it warns, since what was learned counts."""
+  try:
+    from lfgp_dmc.study import run_picture  # matplotlib takes its time
+
+    picture = path / run_picture.NAME
+    run_picture.draw(path, picture)
+    return picture
+  except Exception as error:
+    logging.warning("no picture of the run: %s", error)
+    return None
 
 
 def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
