@@ -54,8 +54,8 @@ _OUTPUT = flags.DEFINE_string(
 _GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
 _SEED = flags.DEFINE_integer("seed", 0, "Of the (first) reset.", lower_bound=0)
 _CAMERA = flags.DEFINE_string("camera", "three_quarter", "The camera's name.")
-_HEIGHT = flags.DEFINE_integer("height", 480, "In pixels.", lower_bound=32)
-_WIDTH = flags.DEFINE_integer("width", 640, "In pixels.", lower_bound=32)
+_HEIGHT = flags.DEFINE_integer("height", 480, "In pixels.", 32, 4320)
+_WIDTH = flags.DEFINE_integer("width", 640, "In pixels.", 32, 7680)
 _SHADOWS = flags.DEFINE_bool(
   "shadows", True, "Shadows and smooth edges; without, 3 times as fast."
 )

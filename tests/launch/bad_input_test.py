@@ -21,6 +21,7 @@ _BAD = (
   ("evaluate.py --expert=mine", "should be one of <scripted>"),
   ("evaluate.py --expert=scripted --episodes=0", "not a positive integer"),
   ("render_policy.py --expert=scripted --task=juggle", "valid: stack, "),
+  ("render_policy.py --expert=scripted --height=99999", "4320"),
   ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
   (
     "evaluate.py --expert=scripted --output=a_file/b",
