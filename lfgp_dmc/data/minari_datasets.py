@@ -15,7 +15,8 @@ import minari
 import numpy as np
 from minari.data_collector import EpisodeBuffer
 
-from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.demonstration_checks import jumps
+from lfgp_dmc.data.demonstrations import Demonstrations, from_attempts
 
 _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
 
@@ -31,13 +32,10 @@ def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
   """
   if dataset_id in minari.list_local_datasets():
     raise ValueError(f"the Minari dataset {dataset_id} exists; choose another")
-  gaps = (data.episode[1:] == data.episode[:-1]) & np.any(
-    data.observation[1:] != data.next_observation[:-1], axis=1
-  )
-  if gaps.any():
+  if rows := jumps(data.arrays()):
     raise ValueError(
-      f"row {int(np.argmax(gaps)) + 1} does not start where the row before "
-      "ended; Minari keeps whole trajectories"
+      f"row {rows[0]} does not start where the row before ended; Minari keeps "
+      "whole trajectories"
     )
   dataset = minari.create_dataset_from_buffers(
     dataset_id,
@@ -79,22 +77,9 @@ def from_minari(
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")
-  pairs = [
-    (one.observations[:-1], one.actions, one.observations[1:])
-    for one in episodes
-  ]
-  observation, action, after = (
-    np.concatenate(parts).astype(np.float32)
-    for parts in zip(*pairs, strict=True)
-  )
-  lengths = [len(one.actions) for one in episodes]
-  return Demonstrations(
-    observation,
-    action,
-    after,
-    episode=np.repeat(np.arange(len(episodes), dtype=np.int32), lengths),
-    is_last=np.concatenate([_success(one) for one in episodes]),
-    attributes={**json.loads(str(stored)), **(attributes or {})},
+  return from_attempts(
+    ((one.observations, one.actions, _success(one)) for one in episodes),
+    {**json.loads(str(stored)), **(attributes or {})},
   )
 
 
