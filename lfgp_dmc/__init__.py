@@ -55,11 +55,14 @@ def load(
     task: a name in `ALL_TASKS`.
     seed: fixes everything random in the environment; None draws a fresh seed.
     **options: `reward` ("sparse" or "dense"), `observations` ("features" or
-      "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20),
+      "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20 Hz),
       `time_limit` (18.0 s), `show_rewards` (False); see `tasks.load`.
 
   Returns:
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
+    Actions are [4] in [-1, 1]: moves of the set-point along x, y, z (1 is 1 cm
+    in 50 ms), and the gripper (below 0 opens, above 0 closes). Observations are
+    a dictionary: `flatten`, `successes`, `conditions` read it.
 
   Raises:
     ValueError: an unknown task, option or value, with the valid ones; vision
