@@ -5,13 +5,15 @@
 row belongs to, never decreasing), `is_last` bool [N] (the row of success; an
 attempt cut by the exact count has none), and the attributes `schema_version`,
 `task`, `main_task`, `collection`, `expert`, `seed`, `control_hz`. Your own
-arrays become such a file by `write("stack.hdf5", Demonstrations(...), {...})`.
+attempts become such a file by `write("stack.hdf5", from_attempts(...), {...})`.
 """
 
 import dataclasses
+import io
 import os
 import pathlib
-from collections.abc import Mapping, Sequence
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import h5py
@@ -63,21 +65,61 @@ class Demonstrations:
     return Demonstrations(**cut, attributes=self.attributes)
 
 
-def create_folder(path: files.Path) -> pathlib.Path:
-  """Makes a new dataset folder; an existing one is never written into.
+def from_attempts(
+  attempts: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]],
+  attributes: Mapping[str, Any] | None = None,
+) -> Demonstrations:
+  """Makes pairs of attempts; what was recorded after success is left out.
+
+  Args:
+    attempts: of each T + 1 states, [T + 1, O]; T actions, [T, A]; and whether
+      each action led to success, bool [T].
+    attributes: see `write`.
 
   Raises:
+    DatasetError: there is no attempt.
+  """
+  parts = []
+  for number, (states, actions, succeeded) in enumerate(attempts):
+    steps = min(len(actions), int(np.argmax([*succeeded, True])) + 1)
+    episode, after = np.full(steps, number), states[1 : steps + 1]
+    parts.append(
+      (states[:steps], actions[:steps], after, episode, succeeded[:steps])
+    )
+  if not parts:
+    raise DatasetError("there is no attempt")
+  arrays = {
+    name: np.concatenate(part).astype(dtype)
+    for (name, dtype), part in zip(
+      checks.DTYPES.items(), zip(*parts, strict=True), strict=True
+    )
+  }
+  return Demonstrations(**arrays, attributes=attributes or {})
+
+
+def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
+  """Writes a new dataset folder, a file a task: all of them or nothing.
+
+  Raises:
+    DatasetError: as of `write`, or a task's name is no file name.
     FileExistsError: something is already there.
   """
-  folder = pathlib.Path(path)
-  try:
-    folder.mkdir(parents=True)
-  except FileExistsError:
-    raise FileExistsError(
-      f"{folder} exists; datasets are never written into: choose another "
-      "--output or move it away"
-    ) from None
-  return folder
+  final = pathlib.Path(path)
+  final.parent.mkdir(parents=True, exist_ok=True)
+  prefix = f".{final.name}.partial."
+  with tempfile.TemporaryDirectory(prefix=prefix, dir=final.parent) as aside:
+    folder = pathlib.Path(aside) / final.name
+    folder.mkdir()
+    for task, data in found.items():
+      if pathlib.Path(task).name != task:
+        raise DatasetError(f"task is {task!r}; valid: a file's name")
+      write(folder / (task + SUFFIX), data)
+    if final.exists():
+      raise FileExistsError(
+        f"{final} exists; datasets are never written into: choose another "
+        "folder or move it away"
+      )
+    os.rename(folder, final)
 
 
 def write(
@@ -88,7 +130,7 @@ def write(
   """Writes one task's file: checked first, then whole or not at all.
 
   Args:
-    path: `<dataset>/<task>.hdf5`, in a folder that exists.
+    path: `<dataset>/<task>.hdf5`.
     demonstrations: of the task.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed`,
       `control_hz`; None takes the demonstrations' own. `schema_version` is
@@ -110,11 +152,14 @@ def write(
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
-  with files.replacing(path) as aside, h5py.File(aside, "w") as file:
+  path.parent.mkdir(parents=True, exist_ok=True)
+  content = io.BytesIO()  # HDF5 has no OSError for a full disk
+  with h5py.File(content, "w") as file:
     for name, array in arrays.items():
       file.create_dataset(name, data=array)
     for name, value in attributes.items():
       file.attrs[name] = value
+  files.write_bytes(path, content.getvalue())
 
 
 def read(
@@ -134,7 +179,10 @@ def read(
     raise DatasetError(f"{path}: missing")
   try:
     arrays, attributes = _read_all(path)
-  except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+  except (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
+    OverflowError, AttributeError,
+  ) as error:  # fmt: skip
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
@@ -182,33 +230,36 @@ def read_folder(
 def summary_table(demonstrations: Mapping[str, Demonstrations]) -> str:
   """A plain-text table of what a dataset holds, one row a task.
 
-  Columns: pairs, episodes, mean and longest episode in steps, share of rows
-  that are an episode's success, mean |a|, share of action values beyond 0.95,
-  and the share of rows that have the commonest gripper value (last action).
+  Columns: pairs; attempts, and how many end in a row of success; the median and
+  the most steps of an attempt; the share of action values beyond 0.95; and the
+  least and the greatest value of each dimension of the action.
   """
   rows = [
-    f"{'task':<16}{'pairs':>8}{'episodes':>10}{'mean len':>10}{'longest':>9}"
-    f"{'is_last':>9}{'mean |a|':>10}{'> 0.95':>8}{'gripper':>9}"
+    f"{'task':<16}{'pairs':>7}{'attempts':>9}{'success':>8}{'median':>7}"
+    f"{'most':>5}{'|a|>.95':>8}  actions from:to"
   ]
   for task, data in demonstrations.items():
     lengths = np.unique(data.episode, return_counts=True)[1]
-    gripper = np.unique(data.action[:, -1], return_counts=True)[1]
-    size = np.abs(data.action)
+    ranges = [f"{a.min():.2f}:{a.max():.2f}" for a in data.action.T]
     rows.append(
-      f"{task:<16}{len(data):>8}{len(lengths):>10}{lengths.mean():>10.1f}"
-      f"{lengths.max():>9}{data.is_last.mean():>9.2%}{size.mean():>10.3f}"
-      f"{(size > 0.95).mean():>8.1%}{gripper.max() / len(data):>9.2%}"
+      f"{task:<16}{len(data):>7}{len(lengths):>9}{data.is_last.sum():>8}"
+      f"{np.median(lengths):>7g}{lengths.max():>5}"
+      f"{(np.abs(data.action) > 0.95).mean():>8.1%}  {' '.join(ranges)}"
     )
   return "\n".join(rows)
 
 
-def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
+def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
   """Every top-level dataset and every attribute, as NumPy and Python values."""
   arrays = {}
   with h5py.File(path, "r") as file:
     for name in checks.DTYPES:
       if name in file and isinstance(file[name], h5py.Dataset):
-        arrays[name] = file[name][()]
+        size = file[name].nbytes
+        # Compression packs a thousandfold at most.
+        if size > 1000 * path.stat().st_size + (1 << 20):
+          raise ValueError(f"{name!r} declares {size:,} bytes")
+        arrays[name] = np.asarray(file[name][()])
     attributes = {
       name: value.item() if isinstance(value, np.generic) else value
       for name, value in file.attrs.items()
