@@ -23,10 +23,10 @@ from collections.abc import Sequence
 from absl import flags, logging
 
 import lfgp_dmc
+from lfgp_dmc import signals
 from lfgp_dmc.launch import command, sweep_engines, sweep_jobs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.sweep_jobs import Job
-from lfgp_dmc.runs import signals
 
 _ALGORITHMS = flags.DEFINE_list("algorithms", ["lfgp"], "Names of flagfiles.")
 _MAIN_TASKS = flags.DEFINE_list(

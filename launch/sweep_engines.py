@@ -16,16 +16,11 @@ from typing import Any
 
 from absl import logging
 
+from lfgp_dmc.acting.workers import ONE_THREAD
 from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
 _CHILD = pathlib.Path(__file__).with_name("sweep_child.py")
-_VARIABLES = {
-  "OMP_NUM_THREADS": "1",
-  "MKL_NUM_THREADS": "1",
-  "OPENBLAS_NUM_THREADS": "1",
-  "OMP_WAIT_POLICY": "PASSIVE",
-}
 
 
 class LocalEngine:
@@ -166,6 +161,6 @@ def popen(
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,
-      env={**os.environ, **_VARIABLES},
+      env={**os.environ, **ONE_THREAD},
       start_new_session=True,
     )

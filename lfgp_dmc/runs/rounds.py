@@ -9,7 +9,7 @@ import tqdm
 
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
-from lfgp_dmc.runs.signals import stop_request
+from lfgp_dmc.signals import stop_request
 from lfgp_dmc.types import Agent, Metrics
 
 EvaluateFn = Callable[[int], Mapping[str, float]]
