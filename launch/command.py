@@ -12,7 +12,7 @@ from typing import TypeVar
 from absl import app, flags
 from absl import logging as absl_logging
 
-from lfgp_dmc import graphics
+from lfgp_dmc import graphics, threads
 
 _T = TypeVar("_T", str, int)
 
@@ -40,6 +40,7 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
+  threads.wait_passively()
   for stream in (sys.stdout, sys.stderr):  # of any encoding
     if isinstance(stream, io.TextIOWrapper):
       stream.reconfigure(errors="backslashreplace")

@@ -23,11 +23,10 @@ from lfgp_dmc import graphics, seeding, task_names
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
-from lfgp_dmc.launch import command, config_flags, policies, training
+from lfgp_dmc.launch import command, config_flags, policies
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.study import figures, run_results
 from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
@@ -50,6 +49,10 @@ _RATE = 20.0  # 50 ms a second
 
 def main() -> int:
   """Does everything, and says how long it took and where things are."""
+  # They load torch and matplotlib: not for --help.
+  from lfgp_dmc.launch import training
+  from lfgp_dmc.study import figures, run_results
+
   start = time.monotonic()
   with command.checked_input():
     config = config_flags.resolved()
@@ -102,6 +105,8 @@ def _columns(
   config: RunConfig, path: pathlib.Path, stored: policies.PolicySpec | None
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
+  from lfgp_dmc.launch import training
+
   rows = evaluation_csv.read_csv(path / "evaluation.csv")
   tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:

@@ -15,7 +15,7 @@ import shlex
 from absl import flags
 
 from lfgp_dmc.data import evaluation_csv
-from lfgp_dmc.launch import command, config_flags, configs, training
+from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.schedule import Progress
@@ -32,6 +32,8 @@ _RESUME = flags.DEFINE_bool(
 
 def main() -> int:
   """Resolves the config, trains, and says where everything is."""
+  from lfgp_dmc.launch import training  # loads torch: not for --help
+
   config = _config()
   path = pathlib.Path(configs.fill(_RUN.value, config.to_dict()))
   if not _RUN.value:

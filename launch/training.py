@@ -4,7 +4,7 @@ import pathlib
 import shutil
 from typing import Any
 
-from lfgp_dmc.agents.lfgp import LfgpAgent
+from lfgp_dmc.agents.lfgp.agent import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, command

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import scipy.stats
 
 _TRIMMED = 0.25  # share cut from each end
 
@@ -34,6 +33,7 @@ def mean(scores: np.ndarray) -> Estimate:
 
 def interquartile_mean(scores: np.ndarray) -> Estimate:
   """Mean of the middle half of all runs and tasks, and its 95 % interval."""
+  import scipy.stats  # takes its time: not for --help
 
   def statistic(*tasks: np.ndarray, axis: int) -> np.ndarray:
     together = np.concatenate(tasks, axis=axis)
@@ -55,6 +55,8 @@ def _bootstrap(statistic: Callable, *strata: np.ndarray) -> Estimate:
     statistic: a function of the strata and `axis=-1`, vectorised.
     *strata: float [T, runs] each; a single run has a band without height.
   """
+  import scipy.stats
+
   middle = statistic(*strata, axis=-1)
   if min(stratum.shape[-1] for stratum in strata) == 1:
     return Estimate(middle, middle, middle)
