@@ -5,7 +5,8 @@
   python launch/train.py --run=runs/stack_1 --resume
 
 The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
-events, checkpoints/, replay/ and policy.safetensors.
+events, checkpoints/, replay/ and policy.safetensors; in the end also
+learning_curve.png, which launch/plot.py --run draws at any time.
 """
 
 import functools
@@ -38,6 +39,7 @@ def main() -> int:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
   progress = training.train(config, path, _RESUME.value)
+  training.draw(path)
   return report(config, path, progress)
 
 
