@@ -49,10 +49,6 @@ _RATE = 20.0  # 50 ms a second
 
 def main() -> int:
   """Does everything, and says how long it took and where things are."""
-  # They load torch and matplotlib: not for --help.
-  from lfgp_dmc.launch import training
-  from lfgp_dmc.study import figures, run_results
-
   start = time.monotonic()
   with command.checked_input():
     config = config_flags.resolved()
@@ -61,13 +57,14 @@ def main() -> int:
     path = run_folder.default_path("quickstart", config.main_task)
   stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
+  from lfgp_dmc.launch import training  # loads torch: not for --help
+
   progress = training.train(config, path)
+  figure = training.draw(path)
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
   columns = _columns(config, path, stored)
-  figure = path / "learning_curve.png"
-  figures.learning_curve(run_results.read_runs([path])[0], figure)
   clip = _film(config, path, columns, stored)
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
@@ -75,7 +72,7 @@ def main() -> int:
   print(f"run folder      {path}")
   print(f"demonstrations  {config.demonstrations}")
   print(f"success table   {path / 'success.txt'}")
-  print(f"learning curve  {figure}")
+  print(f"learning curve  {figure or 'none'}")
   print(f"video           {clip or graphics.fault()}")
   print(f"total time      {(time.monotonic() - start) / 60:.1f} minutes")
   return 0

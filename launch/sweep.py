@@ -16,6 +16,7 @@ same Python environment; a run whose node is lost is resumed on another.
 import collections
 import functools
 import pathlib
+import shlex
 import signal
 import time
 from collections.abc import Sequence
@@ -74,7 +75,8 @@ def main() -> int:
   sweep_jobs.recall(jobs, runs / sweep_jobs.INDEX_NAME)
   if _DRY_RUN.value:
     for job in jobs:
-      print(f"{job.state:<12} {job.name:<32} {' '.join(job.train_arguments())}")
+      arguments = shlex.join(job.train_arguments())
+      print(f"{job.state:<12} {job.name:<32} {arguments}")
     print(_summary(jobs))
     return 0
   if all(job.state == sweep_jobs.MISSING for job in jobs):

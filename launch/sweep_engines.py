@@ -8,6 +8,7 @@ import asyncio
 import os
 import pathlib
 import platform
+import shlex
 import signal
 import subprocess
 import sys
@@ -153,7 +154,7 @@ def popen(
   with open(log, "a", encoding="utf-8") as output:
     # A killed attempt leaves the log within a line.
     lead = "\n" if output.tell() else ""
-    output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
+    output.write(f"{lead}$ train.py {shlex.join(arguments)}  # on {place}\n")
     output.flush()
     python, starter = sys.executable, str(os.getpid())
     return subprocess.Popen(

@@ -72,7 +72,7 @@ def make_jobs(
   arguments: Sequence[str] = (),
   flags: pathlib.Path = FLAGS,
 ) -> list[Job]:
-  """Every algorithm on every main task, seed by seed.
+  """Every algorithm on every main task, seed by seed; each run once.
 
   Args:
     algorithms: names of flagfiles, such as lfgp or lfgp_play; with a task after
@@ -82,25 +82,36 @@ def make_jobs(
     runs: folder for the runs.
     arguments: more of `launch/train.py`; `{runs}` and `{seed}` are filled in.
     flags: folder of the flagfiles; jobs that find none are `MISSING`.
+
+  Raises:
+    ValueError: a name is empty or a path, or there is nothing to run.
   """
-  jobs = []
+  for name in (*algorithms, *main_tasks):
+    if not name or "/" in name:
+      raise ValueError(f"{name!r} is no name of a flagfile or a task")
+  jobs: dict[str, Job] = {}
   for seed in seeds:
     for algorithm in algorithms:
       stem, tasks = _split(algorithm, main_tasks)
       for main_task in tasks:
-        values = {"runs": runs, "seed": seed}
         job = Job(
           algorithm,
           main_task,
           seed,
           runs / f"{stem}_{main_task}_{seed}",
           flags / f"{stem}.flags",
-          tuple(argument.format(**values) for argument in arguments),
+          tuple(
+            # No format(): other braces are the argument's own.
+            argument.replace("{runs}", str(runs)).replace("{seed}", str(seed))
+            for argument in arguments
+          ),
         )
         if not job.flagfile.is_file():
           job.state = MISSING
-        jobs.append(job)
-  return jobs
+        jobs.setdefault(job.name, job)
+  if not jobs:
+    raise ValueError("no runs: give algorithms, main tasks and seeds")
+  return [*jobs.values()]
 
 
 def _split(
@@ -121,10 +132,10 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
   that field.
 
   Raises:
-    ValueError: not of that form.
+    ValueError: not of that form, or a target has two sources.
   """
   known = {job.name: job for job in jobs}
-  for start in starts:
+  for start in dict.fromkeys(starts):
     parts = start.split(":")
     if len(parts) != 3 or not all(parts):
       raise ValueError(f"{start!r}; valid: TARGET:SOURCE:config.FIELD")
@@ -132,6 +143,8 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
     for job in jobs:
       if job.name != f"{target}_{job.seed}":
         continue
+      if job.after:
+        raise ValueError(f"{start!r}: {target} starts from {job.after} already")
       job.after = f"{source}_{job.seed}"
       folder = job.folder.with_name(job.after)
       job.arguments = (*job.arguments, f"--{field}={folder}")

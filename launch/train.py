@@ -5,7 +5,8 @@
   python launch/train.py --run=runs/stack_1 --resume
 
 The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
-events, checkpoints/, replay/ and policy.safetensors.
+events, checkpoints/, replay/ and policy.safetensors; in the end also
+learning_curve.png, which launch/plot.py --run draws at any time.
 """
 
 import functools
@@ -32,14 +33,15 @@ _RESUME = flags.DEFINE_bool(
 
 def main() -> int:
   """Resolves the config, trains, and says where everything is."""
-  from lfgp_dmc.launch import training  # loads torch: not for --help
-
   config = _config()
   path = pathlib.Path(configs.fill(_RUN.value, config.to_dict()))
   if not _RUN.value:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
+  from lfgp_dmc.launch import training  # loads torch: not for --help
+
   progress = training.train(config, path, _RESUME.value)
+  training.draw(path)
   return report(config, path, progress)
 
 

@@ -4,6 +4,8 @@ import pathlib
 import shutil
 from typing import Any
 
+from absl import logging
+
 from lfgp_dmc.agents.lfgp.agent import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data.replay import Replay
@@ -52,6 +54,19 @@ def train(
       shutil.rmtree(path)
     raise UserError(str(error)) from error
   return run.train()
+
+
+def draw(path: pathlib.Path) -> pathlib.Path | None:
+  """Draws a run; where that fails it warns, since what was learned counts."""
+  try:
+    from lfgp_dmc.study import run_picture  # matplotlib takes its time
+
+    picture = path / run_picture.NAME
+    run_picture.draw(path, picture)
+    return picture
+  except Exception as error:
+    logging.warning("no picture of the run: %s", error)
+    return None
 
 
 def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:

@@ -19,26 +19,32 @@ _REPEAT = 2.0  # s
 _last = -math.inf  # when a signal counted
 
 
-class StopRequestedError(Exception):
-  """A phase that can be given up was left because a stop is requested."""
+class StopError(KeyboardInterrupt):
+  """What may be given up was left, since a stop is requested."""
 
 
 class StopRequest:
   """Whether a stop is requested."""
 
-  is_made = False
+  def __init__(self):
+    self.is_made = self.raises = False
 
   def __bool__(self) -> bool:
     return self.is_made
 
+  @contextlib.contextmanager
+  def at_once(self) -> Iterator[None]:
+    """Within, a request raises StopError, also one that was made before."""
+    self.raises = True
+    try:
+      if self:
+        raise StopError
+      yield
+    finally:
+      self.raises = False
+
 
 _current: StopRequest | None = None  # of the running `stop_request`
-
-
-def poll() -> None:
-  """Raises StopRequestedError if a stop is requested; for long phases."""
-  if _current:
-    raise StopRequestedError
 
 
 @contextlib.contextmanager
@@ -100,6 +106,8 @@ def _handle(number: int, frame: Any) -> None:
     signal.Signals(number).name,
     _REPEAT,
   )
+  if _current.raises:
+    raise StopError
 
 
 def _install(handler: Any) -> dict[int, Any]:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import dm_env
 from absl import logging
 
-from lfgp_dmc import progress_bars, seeding, signals
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.acting import workers as work
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
@@ -43,7 +43,6 @@ def evaluate(
 
   Raises:
     LostWorkerError: see `workers.ordered`.
-    StopRequestedError: see `signals.poll`.
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
@@ -59,12 +58,8 @@ def evaluate(
     show=progress,
     leave=False,
   )
-  rows: list[EvaluationRow] = []
   with contextlib.closing(results):
-    for row in bar:
-      rows.append(row)
-      signals.poll()
-  return rows
+    return list(bar)
 
 
 class _Player:

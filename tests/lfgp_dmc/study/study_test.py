@@ -37,6 +37,18 @@ class StatisticsTest(absltest.TestCase):
     found = statistics.interquartile_mean(np.full((1, 1, 3), 0.25))
     np.testing.assert_allclose(found, np.full((3, 3), 0.25))
 
+  def test_probability_of_improvement(self):
+    # First task: 3 wins of 4 pairs; second: 4 ties.
+    found = statistics.probability_of_improvement(
+      _scores([1, 3], [1, 1]), _scores([2, 0], [1, 1])
+    )
+    # Resamples of the first task range from (1, 1) against (2, 2) to all wins.
+    np.testing.assert_allclose(found, [[0.625], [0.25], [0.75]])
+    better = statistics.probability_of_improvement(
+      _scores([3, 4, 5]), _scores([1, 2])
+    )
+    np.testing.assert_allclose(better, [[1.0], [1.0], [1.0]])
+
 
 class StudyTest(FolderTest):
   def _write(self, algorithm, main_task, seed, scores, **config):
