@@ -72,6 +72,8 @@ def probability_of_improvement(
 
 def share(value: float, episodes: int) -> Estimate:
   """A share of so many episodes, and Wilson's 95 % interval; [1] each."""
+  import scipy.stats
+
   found = scipy.stats.binomtest(round(value * episodes), episodes)
   low, high = found.proportion_ci(method="wilson")
   return Estimate(*np.array([[value], [low], [high]]))
