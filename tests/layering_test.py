@@ -87,6 +87,7 @@ class LayeringTest(parameterized.TestCase):
       {"torch", *_SIMULATOR},
     ),
     ("lfgp_dmc.tasks.environment", {"torch"}),
+    ("lfgp_dmc.agents.policy", {"torch", *_SIMULATOR}),
     ("lfgp_dmc", {"matplotlib", "scipy", "h5py", "pydantic"}),
     *(  # as for --help
       (f"lfgp_dmc.launch.{name}", {"torch", "scipy", *_SIMULATOR})

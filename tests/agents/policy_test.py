@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
@@ -23,7 +24,7 @@ def _policy(layout="shared_trunk"):
   network = layouts.make_intentions(
     layout, standardiser, len(TASKS), H, A, generator
   )
-  return Policy(network, TASKS)
+  return NetworkPolicy(network, TASKS)
 
 
 def _observation(*shape):
