@@ -14,15 +14,16 @@ class NetworkPolicy(Policy):
 
   def __init__(self, network: IntentionNetwork, tasks: Sequence[str]):
     self._network = network
+    self._tensors = network.state_dict(keep_vars=True)  # not copied
     scale = network.standardiser.tanh_feature_scale
-    super().__init__(network.state_dict(keep_vars=True), tasks, scale)
+    super().__init__(self._tensors, tasks, scale)
 
   def arrays(self) -> dict[str, np.ndarray]:
     """See `Policy.arrays`."""
     return serialisation.module_state(self._network)
 
   def _read(self, name: str, index: int) -> np.ndarray:
-    tensor = self._arrays[name].detach()
+    tensor = self._tensors[name].detach()
     if name.startswith("heads."):
       tensor = tensor[index]
     return tensor.cpu().numpy()
