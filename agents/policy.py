@@ -94,7 +94,7 @@ class Policy:
       raise ValueError("; ".join(faults)) from None
     fields.check_arrays(arrays, checked.shapes(), "policy arrays")
     single = {name: np.asarray(a, np.float32) for name, a in arrays.items()}
-    return cls(single, checked.tasks, checked.tanh_feature_scale)
+    return Policy(single, checked.tasks, checked.tanh_feature_scale)
 
   @classmethod
   def load(cls, folder: str | os.PathLike[str]) -> "Policy":
