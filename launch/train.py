@@ -40,7 +40,8 @@ def main() -> int:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
   progress = training.train(config, path, _RESUME.value)
-  training.draw(path)
+  if progress.is_complete:  # whoever stops a run waits
+    training.draw(path)
   return report(config, path, progress)
 
 
