@@ -84,7 +84,7 @@ def make_jobs(
     flags: folder of the flagfiles; jobs that find none are `MISSING`.
 
   Raises:
-    ValueError: a name is empty or a path, or there is nothing to run.
+    ValueError: a name is empty, or a path.
   """
   for name in (*algorithms, *main_tasks):
     if not name or "/" in name:
@@ -109,8 +109,6 @@ def make_jobs(
         if not job.flagfile.is_file():
           job.state = MISSING
         jobs.setdefault(job.name, job)
-  if not jobs:
-    raise ValueError("no runs: give algorithms, main tasks and seeds")
   return [*jobs.values()]
 
 
@@ -132,10 +130,10 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
   that field.
 
   Raises:
-    ValueError: not of that form, or a target has two sources.
+    ValueError: not of that form.
   """
   known = {job.name: job for job in jobs}
-  for start in dict.fromkeys(starts):
+  for start in starts:
     parts = start.split(":")
     if len(parts) != 3 or not all(parts):
       raise ValueError(f"{start!r}; valid: TARGET:SOURCE:config.FIELD")
@@ -143,8 +141,6 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
     for job in jobs:
       if job.name != f"{target}_{job.seed}":
         continue
-      if job.after:
-        raise ValueError(f"{start!r}: {target} starts from {job.after} already")
       job.after = f"{source}_{job.seed}"
       folder = job.folder.with_name(job.after)
       job.arguments = (*job.arguments, f"--{field}={folder}")

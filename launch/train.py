@@ -42,7 +42,8 @@ def main() -> int:
   from lfgp_dmc.launch import training  # loads torch: not for --help
 
   progress = training.train(config, path, _RESUME.value)
-  training.draw(path)
+  if progress.is_complete:  # whoever stops a run waits
+    training.draw(path)
   return report(config, path, progress)
 
 

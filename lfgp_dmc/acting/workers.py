@@ -51,11 +51,10 @@ def ordered(
   crew: list[_Worker] = []
   threads = concurrent.futures.ThreadPoolExecutor(workers)  # each waits for one
   try:
+    resource_tracker.ensure_running()  # its start lets signals through again
     with signals.held(), _variables():
-      resource_tracker.ensure_running()  # lets signals through again
-      with signals.held():
-        for _ in range(workers):
-          crew.append(_Worker(make_state))
+      for _ in range(workers):
+        crew.append(_Worker(make_state))
     idle = collections.deque(crew)
 
     def do(job: Any) -> Any:
@@ -109,12 +108,10 @@ class _Worker:
 
   def _fate(self) -> str:
     self._process.join()
-    status = self._process.exitcode or 0
-    if status >= 0:
-      return f"a worker process ended with exit status {status}"
-    name = signal.Signals(-status).name
-    why = ", as by the kernel when memory runs out" if name == "SIGKILL" else ""
-    return f"a worker process was killed by {name}{why}"
+    status = self._process.exitcode
+    if status == -signal.SIGKILL:
+      return "a worker process was killed, as by the kernel out of memory"
+    return f"a worker process ended with exit status {status}"
 
 
 def _serve(make_state: MakeState, connection: Any) -> None:

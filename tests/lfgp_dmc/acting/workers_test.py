@@ -51,7 +51,7 @@ class WorkersTest(absltest.TestCase):
       list(workers.ordered(_Player, [1, "fail", 2], 2))
     self.assertIn("in __call__", raised.exception.__notes__[0])
     with self.assertRaisesRegex(
-      workers.LostWorkerError, "killed by SIGKILL, as by the kernel"
+      workers.LostWorkerError, "was killed, as by the kernel"
     ):
       list(workers.ordered(_Player, [1, "die", 2], 2))
 
