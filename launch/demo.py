@@ -38,8 +38,8 @@ _STORED = flags.DEFINE_string(
   "A policy folder to show beside it; default: results/policies/TASK, if it is "
   "there.",
 )
-_HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
-_WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
+_HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.", 32, 4320)
+_WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.", 32, 7680)
 _POLICIES = pathlib.Path("results/policies")
 _CLIPS = 3  # intentions shown in the video
 _MOST_SECONDS = 8  # of each

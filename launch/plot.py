@@ -27,7 +27,7 @@ import pathlib
 
 from absl import flags
 
-from lfgp_dmc.data import csv_files
+from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.study import (
   attempt_figures,
@@ -118,6 +118,7 @@ def _draw_attempts() -> None:
 
 def _draw_runs() -> None:
   """Figures of many runs."""
+  files.check_writable(_path("figure"))
   runs, notes = run_results.read_runs(_RUNS.value)
   notes += _draw_each(runs) if _FIGURE.value == _EACH else _draw_study(runs)
   for note in dict.fromkeys(notes):

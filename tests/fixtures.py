@@ -1,6 +1,9 @@
 """What many tests share: a folder of their own, demonstrations, a toy agent."""
 
+import contextlib
 import pathlib
+import resource
+from collections.abc import Iterator
 
 import numpy as np
 from absl.testing import parameterized
@@ -43,6 +46,17 @@ def demonstrations(*lengths: int) -> Demonstrations:
     is_last,
     ATTRIBUTES,
   )
+
+
+@contextlib.contextmanager
+def full_disk(size: int = 20_000) -> Iterator[None]:
+  """No file can grow beyond `size` bytes, whoever writes it."""
+  limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+  resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+  try:
+    yield
+  finally:
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")

@@ -9,8 +9,10 @@ attempts become such a file by `write("stack.hdf5", from_attempts(...), {...})`.
 """
 
 import dataclasses
+import io
 import os
 import pathlib
+import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -84,21 +86,29 @@ def from_attempts(
   return Demonstrations(**arrays, attributes=attributes or {})
 
 
-def create_folder(path: files.Path) -> pathlib.Path:
-  """Makes a new dataset folder; an existing one is never written into.
+def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
+  """Writes a new dataset folder, a file a task: all of them or nothing.
 
   Raises:
+    DatasetError: as of `write`, or a task's name is no file name.
     FileExistsError: something is already there.
   """
-  folder = pathlib.Path(path)
-  try:
-    folder.mkdir(parents=True)
-  except FileExistsError:
-    raise FileExistsError(
-      f"{folder} exists; datasets are never written into: choose another "
-      "--output or move it away"
-    ) from None
-  return folder
+  final = pathlib.Path(path)
+  final.parent.mkdir(parents=True, exist_ok=True)
+  prefix = f".{final.name}.partial."
+  with tempfile.TemporaryDirectory(prefix=prefix, dir=final.parent) as aside:
+    folder = pathlib.Path(aside) / final.name
+    folder.mkdir()
+    for task, data in found.items():
+      if pathlib.Path(task).name != task:
+        raise DatasetError(f"task is {task!r}; valid: a file's name")
+      write(folder / (task + SUFFIX), data)
+    if final.exists():
+      raise FileExistsError(
+        f"{final} exists; datasets are never written into: choose another "
+        "folder or move it away"
+      )
+    os.rename(folder, final)
 
 
 def write(
@@ -132,11 +142,13 @@ def write(
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
   path.parent.mkdir(parents=True, exist_ok=True)
-  with files.replacing(path) as aside, h5py.File(aside, "w") as file:
+  content = io.BytesIO()  # HDF5 has no OSError for a full disk
+  with h5py.File(content, "w") as file:
     for name, array in arrays.items():
       file.create_dataset(name, data=array)
     for name, value in attributes.items():
       file.attrs[name] = value
+  files.write_bytes(path, content.getvalue())
 
 
 def read(
@@ -156,7 +168,10 @@ def read(
     raise DatasetError(f"{path}: missing")
   try:
     arrays, attributes = _read_all(path)
-  except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+  except (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
+    OverflowError, AttributeError,
+  ) as error:  # fmt: skip
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
@@ -223,13 +238,17 @@ def summary_table(demonstrations: Mapping[str, Demonstrations]) -> str:
   return "\n".join(rows)
 
 
-def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
+def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
   """Every top-level dataset and every attribute, as NumPy and Python values."""
   arrays = {}
   with h5py.File(path, "r") as file:
     for name in checks.DTYPES:
       if name in file and isinstance(file[name], h5py.Dataset):
-        arrays[name] = file[name][()]
+        size = file[name].nbytes
+        # Compression packs a thousandfold at most.
+        if size > 1000 * path.stat().st_size + (1 << 20):
+          raise ValueError(f"{name!r} declares {size:,} bytes")
+        arrays[name] = np.asarray(file[name][()])
     attributes = {
       name: value.item() if isinstance(value, np.generic) else value
       for name, value in file.attrs.items()

@@ -1,7 +1,7 @@
 """Learning curves of runs, and the paper's figures of results."""
 
 import itertools
-import pathlib
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -58,8 +58,8 @@ def draw(
       task, the others show main tasks alone.
     runs: of the study, as `read_runs` sorts them; those of other methods are
       left out.
-    output: the picture; its suffix chooses the format. The numbers go to the
-      same name with `.csv`.
+    output: the picture; its suffix chooses the format. The numbers go to
+      its name and `.csv`, such as `main.png.csv`.
     quantity: "success" or "return".
     kind: a key of `statistics.ESTIMATORS`.
 
@@ -98,7 +98,7 @@ def draw(
     drawing.figure(cells, lines, styles, quantity, kind, size), output
   )
   rows = _numbers(lines, kind)
-  csv_files.write(pathlib.Path(output).with_suffix(".csv"), COLUMNS, rows)
+  csv_files.write(f"{os.fspath(output)}.csv", COLUMNS, rows)
   return _notes(styles, runs)
 
 

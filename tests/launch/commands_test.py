@@ -148,7 +148,9 @@ class BlockRunTest(absltest.TestCase):
       self.assertGreater(
         (self.folder / f"clip_{task}{suffix}").stat().st_size, 100
       )
-      sidecar = json.loads((self.folder / f"clip_{task}.json").read_text())
+      sidecar = json.loads(
+        (self.folder / f"clip_{task}{suffix}.json").read_text()
+      )
       self.assertEqual((sidecar["task"], sidecar["steps"]), (task, 10))
 
   def test_renders_play_by_the_expert(self):
@@ -158,7 +160,7 @@ class BlockRunTest(absltest.TestCase):
                       "--height=64 --width=64 --every=20 "
                       "--output=play.png")  # fmt: skip
     self.assertEqual(done.returncode, 0, done.stderr)
-    sidecar = json.loads((self.folder / "play.json").read_text())
+    sidecar = json.loads((self.folder / "play.png.json").read_text())
     self.assertGreater(len(sidecar["intentions"]), 2)
     self.assertNotIn("GLFW", done.stderr)
 
