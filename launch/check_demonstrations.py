@@ -17,7 +17,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
-from lfgp_dmc.data import demonstration_checks, demonstrations
+from lfgp_dmc.data import demonstration_summary, demonstrations
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
@@ -60,14 +60,14 @@ def _read(widths: tuple[int, int]) -> dict[str, demonstrations.Demonstrations]:
   if _TASK.value and not _ENVIRONMENT.value:
     tasks = list(lfgp_dmc.task_set(_TASK.value))
   found = demonstrations.read_folder(folder, tasks, *widths)
-  print(demonstrations.summary_table(found))
+  print(demonstration_summary.table(found))
   rates = sorted({data.attributes["control_hz"] for data in found.values()})
   print(
     f"observations [{widths[0]}], actions [{widths[1]}], control rate: "
     f"{', '.join(f'{rate:g}' for rate in rates)} Hz"
   )
   for task, data in found.items():
-    for doubt in demonstration_checks.doubts(data.arrays()):
+    for doubt in demonstration_summary.doubts(data):
       print(f"look again: {task}: {doubt}")
   if len(rates) > 1:
     raise ValueError(f"{folder} has several control rates")

@@ -20,7 +20,7 @@ from minari.dataset.minari_dataset import parse_dataset_id
 from minari.namespace import validate_namespace
 from minari.storage import get_dataset_path
 
-from lfgp_dmc.data.demonstration_checks import jumps
+from lfgp_dmc.data.demonstration_summary import jumps
 from lfgp_dmc.data.demonstrations import Demonstrations, from_attempts
 
 _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
@@ -64,7 +64,7 @@ def _check(data: Demonstrations, dataset_id: str) -> None:
   for place in (path, *(p for p in path.parents if (p / "data").exists())):
     if place.exists():
       raise ValueError(f"the Minari dataset {place} exists; choose another")
-  if rows := jumps(data.arrays()):
+  if rows := jumps(data):
     raise ValueError(
       f"{dataset_id}: row {rows[0]} does not start where the row before ended; "
       "Minari keeps whole trajectories"

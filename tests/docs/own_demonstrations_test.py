@@ -13,7 +13,7 @@ from absl.testing import absltest
 
 import lfgp_dmc
 from lfgp_dmc import graphics
-from lfgp_dmc.data import demonstration_checks, demonstrations
+from lfgp_dmc.data import demonstration_summary, demonstrations
 from tests import fixtures
 from tests.docs import pages
 from tests.launch.fixtures import call
@@ -82,7 +82,7 @@ class OwnDemonstrationsTest(fixtures.FolderTest):
     np.testing.assert_array_equal(np.flatnonzero(pairs.is_last)[:3], [2, 6, 8])
     self.assertEqual(pairs.observation[3].tolist(), [100, 100, -100])
     self.assertEqual(pairs.next_observation[6].tolist(), [104, 104, -104])
-    self.assertEmpty(demonstration_checks.doubts(pairs.arrays()))
+    self.assertEmpty(demonstration_summary.doubts(pairs))
 
   def test_lerobots_last_frame_can_be_the_success(self):
     columns = {
@@ -136,12 +136,14 @@ class OwnDemonstrationsTest(fixtures.FolderTest):
 class DoubtsTest(absltest.TestCase):
   def test_what_is_seldom_meant_is_named(self):
     good = fixtures.demonstrations(4, 3)
+    self.assertEmpty(demonstration_summary.doubts(good))
     arrays = good.arrays()
-    self.assertEmpty(demonstration_checks.doubts(arrays))
     arrays["action"] = arrays["action"] * np.array([1, 0.01], np.float32)
     arrays["is_last"] = np.zeros(7, bool)
     arrays["observation"][2] += 1
-    first, second, third = demonstration_checks.doubts(arrays)
+    first, second, third = demonstration_summary.doubts(
+      demonstrations.Demonstrations(**arrays)
+    )
     self.assertIn("no row of success", first)
     self.assertIn("dimension 1", second)
     self.assertIn("1 rows do not start where the row before ended", third)

@@ -56,16 +56,21 @@ class DatasetsTest(fixtures.RunTest):
       demonstrations=str(folder), collect_pairs=30, environment="",
       main_task="lift",
     )  # fmt: skip
-    done = mock.Mock(returncode=1)
     with (
-      mock.patch.object(subprocess, "run", return_value=done) as run,
+      mock.patch.object(subprocess, "Popen") as popen,
       mock.patch("builtins.print") as printed,
-      self.assertRaisesRegex(UserError, "could not be collected"),
     ):
-      datasets.load(config, ["lift"], (59, 4))
-    self.assertIn(f"--output={folder}", run.call_args.args[0])
+      process = popen.return_value.__enter__.return_value
+      process.wait.return_value = 1
+      with self.assertRaisesRegex(UserError, "could not be collected"):
+        datasets.load(config, ["lift"], (59, 4))
+      process.wait.side_effect = [KeyboardInterrupt, 130]
+      with self.assertRaises(KeyboardInterrupt):
+        datasets.load(config, ["lift"], (59, 4))
+      process.terminate.assert_called_once()  # and not killed
+    self.assertIn(f"--output={folder}", popen.call_args.args[0])
     shown = shlex.split(printed.call_args.args[0].partition(": ")[2])
-    self.assertEqual(shown[2:], run.call_args.args[0][2:])
+    self.assertEqual(shown[2:], popen.call_args.args[0][2:])
 
   def test_published_examples_are_read_like_a_dataset(self):
     data = pathlib.Path(__file__).parents[1] / "data"
