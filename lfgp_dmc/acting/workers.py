@@ -13,16 +13,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from multiprocessing import resource_tracker
 from typing import Any
 
-from lfgp_dmc import signals
+from lfgp_dmc import signals, threads
 
 MakeState = Callable[[], Callable[[Any], Any]]
-
-ONE_THREAD = {
-  "OMP_NUM_THREADS": "1",
-  "MKL_NUM_THREADS": "1",
-  "OPENBLAS_NUM_THREADS": "1",
-  "OMP_WAIT_POLICY": "PASSIVE",
-}
 
 
 class LostWorkerError(RuntimeError):
@@ -151,7 +144,7 @@ def _variables() -> Iterator[None]:
   Later would be too late: what the processes unpickle first imports.
   """
   before = dict(os.environ)
-  os.environ.update(ONE_THREAD, MUJOCO_GL="off")
+  os.environ.update(threads.ONE, MUJOCO_GL="off")
   try:
     yield
   finally:

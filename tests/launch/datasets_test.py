@@ -29,6 +29,27 @@ class DatasetsTest(fixtures.RunTest):
       self.assertLen(shown["stack"], pairs)
       self.assertLen(shown["move_object"], 15)
 
+  def test_attempts_are_copied_elsewhere_after_their_images(self):
+    dataset = fixtures.write_dataset(
+      self.folder / "shown", ("stack", "bring"), 59, 4, pairs=20
+    )
+    config = fixtures.small_config(
+      dataset,
+      environment="",
+      main_task="stack",
+      mirror_demonstrations=True,
+      shifted_copies=2,
+      attempts_per_task=1,
+    )
+    shown, again = (
+      datasets.load(config, ["stack", "bring"], (59, 4)) for _ in range(2)
+    )
+    self.assertEqual(shown["stack"].attempts, 6)
+    self.assertEqual(shown["bring"].attempts, 2)
+    np.testing.assert_array_equal(
+      shown["stack"].observation, again["stack"].observation
+    )
+
   def test_collects_into_a_folder_with_blanks(self):
     folder = self.folder / "it's mine; really"
     config = self.config(

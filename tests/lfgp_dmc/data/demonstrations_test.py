@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from absl.testing import parameterized
 
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import demonstration_summary, demonstrations
 from lfgp_dmc.data.demonstrations import DatasetError
 from tests import fixtures
 
@@ -72,6 +72,13 @@ class DemonstrationsTest(fixtures.FolderTest):
       dict(read.attributes), {**fixtures.ATTRIBUTES, "schema_version": 1}
     )
     self.assertLen(read.head(4), 4)
+
+  def test_the_first_whole_attempts(self):
+    self.assertEqual(_DATA.attempts, 1)  # the second is cut
+    for wanted in (1, 2):
+      first = _DATA.head_attempts(wanted)
+      np.testing.assert_array_equal(first.action, _DATA.action[:3])
+      self.assertTrue(first.is_last[-1])
 
   def test_the_same_data_are_the_same_bytes(self):
     self._write()
@@ -191,7 +198,7 @@ class DemonstrationsTest(fixtures.FolderTest):
       demonstrations.read_folder(self.folder / "none", ("reach",))
 
   def test_summary(self):
-    table = demonstrations.summary_table({"reach": _DATA})
+    table = demonstration_summary.table({"reach": _DATA})
     header, row = table.splitlines()
-    self.assertIn("episodes", header)
-    self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])
+    self.assertIn("attempts success median most", header)
+    self.assertEqual(row.split()[:6], ["reach", "6", "2", "1", "3", "3"])
