@@ -15,9 +15,9 @@ from lfgp_dmc.agents.bc.pairs import SplitPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
 from lfgp_dmc.agents.demonstration_pool import make_standardiser
 from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
-from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
@@ -48,7 +48,7 @@ class BcAgent:
     self._pairs = pairs
     self._shuffling = shuffling
     self._best = copy.deepcopy(network).requires_grad_(False)
-    self.policy = Policy(self._best, tasks)  # of the best weights so far
+    self.policy = NetworkPolicy(self._best, tasks)  # of the best weights so far
     self._cloner = IntentionCloner(
       network, config.learning_rate, config.optimiser, config.loss, dtype
     )

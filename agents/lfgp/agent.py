@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import tqdm
 
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import transfer
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
@@ -16,6 +15,7 @@ from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
 from lfgp_dmc.data import files
@@ -39,7 +39,7 @@ class LfgpAgent:
     self.tasks = tuple(tasks)
     self.learner = learner
     self.batches = batches
-    self.policy = Policy(learner.networks.intentions, tasks)
+    self.policy = NetworkPolicy(learner.networks.intentions, tasks)
     self._scheduler = scheduler
     self._pretraining = pretraining
     self._experts = experts
@@ -125,11 +125,11 @@ class LfgpAgent:
       learner.prior.warn_if_precise(
         self.tasks, self._experts, learner.intentions.target_entropy
       )
-    for _ in tqdm.trange(
-      self._first_updates,
+    for _ in progress_bars.bar(
+      range(self._first_updates),
       desc="on the other run's replay",
       unit="update",
-      disable=not (progress_bar and self._first_updates),
+      show=progress_bar and self._first_updates > 0,
     ):
       self.update()
     self._has_started = True
