@@ -31,6 +31,7 @@ class Draw(NamedTuple):
   # Where discriminators are to be updated: the replay's and the experts' side.
   policy: Batch | None = None
   expert: ExpertBatch | None = None
+  replayed: Batch | None = None  # what intentions learn from instead
 
 
 def joined(one: Batch, other: Batch) -> Batch:

@@ -43,7 +43,7 @@ def define(
     "preset",
     "paper",
     "Defaults of the config: paper (the paper's tables), ral (the authors' "
-    "later journal version), fast or fast_precise (ours). --config.x=... "
+    "later journal version), fast, fast_precise or few (ours). --config.x=... "
     "overrides.",
     flag_values=flag_values,
   )

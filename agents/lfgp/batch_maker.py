@@ -71,9 +71,13 @@ class BatchMaker:
     share = config.expert_share * config.expert_share_decay**updates
     rows = int(share * self._rows)
     batch = self._transitions(self._rows - rows)
+    replayed = None if config.intentions_on_experts else batch
     if rows:
-      batch = joined(batch, self._pool.sample_transitions(self.generator, rows))
-    return Draw(batch, policy, expert)
+      shown = self._pool.sample_transitions(
+        self.generator, rows, config.main_expert_share
+      )
+      batch = joined(batch, shown)
+    return Draw(batch, policy, expert, replayed)
 
   def _transitions(self, rows: int) -> Batch:
     """Transitions of the replay, with their rewards if those are used."""

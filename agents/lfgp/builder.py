@@ -58,7 +58,9 @@ def build(
   standardiser = make_standardiser(
     config.inputs, used, tasks, observation_size, action_size
   ).to(device)
-  experts = ExpertPool(used, tasks, standardiser) if used is not None else None
+  experts = None
+  if used is not None:
+    experts = ExpertPool(used, tasks, standardiser, config.final_rows)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
     config, len(tasks), action_size, standardiser, initial, device

@@ -78,6 +78,8 @@ class DiscriminatorReward:
   # Expert rows among those of critics and intentions.
   expert_share: Share = 0.0
   expert_share_decay: Share = 1.0  # factor an update
+  main_expert_share: Share = 0.0  # of these, the main task's; 0: an equal one
+  intentions_on_experts: Switch = True  # or critics alone learn from them
 
 
 @checked
@@ -120,6 +122,8 @@ class PriorConfig:
   distance: Literal["squared_error", "divergence"] = "squared_error"
   normalise: Switch = False  # times each task's mean |Q|
   decay: Share = 1.0  # factor on the weight, an update
+  # Only on rows where the critics prefer its action (Nair et al., 2018).
+  q_filter: Switch = False
 
 
 @checked
@@ -127,6 +131,7 @@ class LfgpConfig:
   """LfGP; LfGP-NS, DAC and SAC-X are settings of it."""
 
   batch_size: PositiveInt = 256
+  final_rows: PositiveInt = 1  # last rows of an attempt that are of success
   inputs: InputsConfig = InputsConfig()
   networks: LfgpNetworksConfig = LfgpNetworksConfig()
   optimiser: OptimiserConfig = OptimiserConfig()

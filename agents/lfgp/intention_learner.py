@@ -1,5 +1,7 @@
 """The intentions' part of an update, and their temperatures'."""
 
+import functools
+
 import torch
 
 from lfgp_dmc.agents.lfgp.config import IntentionConfig
@@ -50,7 +52,8 @@ class IntentionLearner:
       log_prob, q, networks.log_temperature.detach().exp()
     )
     if self._prior is not None:
-      term, more = self._prior(inputs, mean, std, q.detach())
+      values = functools.partial(networks.critics.heads, critic_features)
+      term, more = self._prior(inputs, mean, std, q.detach(), values)
       loss, metrics = loss + term, metrics | more
     norm = clipped_step(
       self.optimisers["policy"], loss, self._parameters, self._max_gradient_norm

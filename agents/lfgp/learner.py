@@ -71,7 +71,10 @@ class LfgpLearner:
     batch = self.reward.label(draw.batch)
     metrics |= self.critics.update(batch)
     if trains_intentions:
-      metrics |= self.intentions.update(batch.inputs[: batch.policy_rows])
+      states = batch.inputs[: batch.policy_rows]
+      if draw.replayed is not None:
+        states = draw.replayed.inputs
+      metrics |= self.intentions.update(states)
     self.critics.update_targets()
     return metrics
 

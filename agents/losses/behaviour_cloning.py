@@ -18,6 +18,7 @@ def behaviour_cloning_loss(
   mean: torch.Tensor,
   action: torch.Tensor,
   weight: torch.Tensor | None = None,
+  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
   """sum_a (tanh(mean) - a)^2, mean over rows, all tasks equal.
 
@@ -25,9 +26,10 @@ def behaviour_cloning_loss(
     mean: [K, N, A], task k's mean before the tanh, for task k's rows.
     action: [K, N, A], the expert's.
     weight: [K], a factor a task; None: 1 / K each. By-task metrics have none.
+    mask: [K, N], a factor a row; None: 1 each.
   """
   error = (torch.tanh(mean) - action).square().sum(-1)
-  return _over_tasks(error.mean(-1), weight)
+  return _over_tasks(error, weight, mask)
 
 
 def likelihood_loss(
@@ -47,7 +49,7 @@ def likelihood_loss(
   value = torch.atanh(action.clamp(-MOST_ACTION, MOST_ACTION))
   noise = (value - mean) / std
   log_prob = tanh_gaussian.log_density(value, std, noise)
-  return _over_tasks(-log_prob.mean(-1), None)
+  return _over_tasks(-log_prob)
 
 
 def divergence_loss(
@@ -56,24 +58,28 @@ def divergence_loss(
   prior_mean: torch.Tensor,
   prior_std: torch.Tensor,
   weight: torch.Tensor | None = None,
+  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
   """KL(pi || prior) in nats, mean over rows, all tasks equal.
 
   That of two Gaussians, as the tanh of both changes nothing; their mean and
   std are [K, N, A]. Where the prior is more precise than `LEAST_STD`, the
   means' distance counts in units of that, so that the intention can still
-  move; std are compared as they are, down to `LEAST_COMPARED`. `weight` is as
-  in `behaviour_cloning_loss`.
+  move; std are compared as they are, down to `LEAST_COMPARED`. `weight` and
+  `mask` are as in `behaviour_cloning_loss`.
   """
   ratio = std / prior_std.clamp(min=LEAST_COMPARED)
   shift = (mean - prior_mean) / prior_std.clamp(min=LEAST_STD)
   divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
-  return _over_tasks(divergence.sum(-1).mean(-1), weight)
+  return _over_tasks(divergence.sum(-1), weight, mask)
 
 
 def _over_tasks(
-  by_task: torch.Tensor, weight: torch.Tensor | None
+  by_row: torch.Tensor,
+  weight: torch.Tensor | None = None,
+  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
+  by_task = (by_row if mask is None else mask * by_row).mean(-1)
   loss = by_task.mean() if weight is None else (weight * by_task).sum()
   return loss, {
     "loss/behaviour_cloning": loss.detach(),

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 import lfgp_dmc
 from lfgp_dmc.acting import collection, evaluation
 from lfgp_dmc.acting.attempts import CollectionPlan
-from lfgp_dmc.launch import command, policies, training
+from lfgp_dmc.launch import command, policies
+from lfgp_dmc.launch.benchmarks import learner
 from lfgp_dmc.launch.configs import RunConfig
 
 _PAIRS_AN_EPISODE = 180  # 9,000 a task beside the paper's 50 episodes
@@ -29,7 +30,8 @@ def measure(config: RunConfig, episodes: int) -> Iterator[tuple[str, float]]:
   yield "processes", cores
   with tempfile.TemporaryDirectory() as folder:
     if not config.init_from:
-      training.write_untrained_policy(config, pathlib.Path(folder))
+      agent = learner.make_agent(config)
+      agent.save_policy(pathlib.Path(folder), config.to_dict(), env_step=0)
     start = time.perf_counter()
     rows = evaluation.evaluate(
       functools.partial(config.environment_spec.build, True),

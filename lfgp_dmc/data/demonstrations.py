@@ -48,9 +48,20 @@ class Demonstrations:
     """The five arrays by name."""
     return {k: getattr(self, k) for k in checks.DTYPES}
 
-  def head(self, pairs: int) -> "Demonstrations":
-    """The first `pairs` pairs."""
-    cut = {name: array[:pairs] for name, array in self.arrays().items()}
+  def head(self, count: int) -> "Demonstrations":
+    """The first `count` pairs."""
+    cut = {name: array[:count] for name, array in self.arrays().items()}
+    return Demonstrations(**cut, attributes=self.attributes)
+
+  @property
+  def attempts(self) -> int:
+    """How many whole attempts there are."""
+    return int(self.is_last.sum())
+
+  def head_attempts(self, count: int) -> "Demonstrations":
+    """The pairs of the first `count` whole attempts."""
+    kept = np.isin(self.episode, self.episode[self.is_last][:count])
+    cut = {name: array[kept] for name, array in self.arrays().items()}
     return Demonstrations(**cut, attributes=self.attributes)
 
 

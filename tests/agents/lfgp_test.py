@@ -1,6 +1,7 @@
 """The LfGP agent on synthetic data: learning, determinism, resuming."""
 
 import math
+from unittest import mock
 
 import numpy as np
 import torch
@@ -124,6 +125,25 @@ class BatchTest(absltest.TestCase):
     self.assertEqual([batch is not None for batch in due],
                      [True, False, False] * 2 + [True])  # fmt: skip
 
+  def test_the_main_task_may_have_a_share_of_its_own(self):
+    agent = make_agent()
+    split = agent.batches._pool.split
+    for share, counts in ((0.0, [12, 10, 10]), (0.5, [16, 8, 8])):
+      task = split(32, share)
+      self.assertEqual(np.bincount(task).tolist(), counts)
+
+  def test_intentions_may_leave_expert_rows_to_the_critics(self):
+    share = {"reward.expert_share": 0.25}
+    self.assertIsNone(make_agent(**share).batches.draw(0).replayed)
+    agent = make_agent(**share, **{"reward.intentions_on_experts": False})
+    draw = agent.batches.draw(0)
+    self.assertTrue(draw.batch.inputs[:24].equal(draw.replayed.inputs))
+    with mock.patch.object(
+      agent.learner.intentions, "update", return_value={}
+    ) as update:
+      agent.learner.update(draw)
+    self.assertIs(update.call_args.args[0], draw.replayed.inputs)
+
   def test_rows_of_success_come_last_and_in_their_share(self):
     agent = make_agent(**{"reward.final_share": 0.5})
     expert = agent.batches.draw(0).expert
@@ -131,6 +151,20 @@ class BatchTest(absltest.TestCase):
       finals = part.observation[part.is_last]
       found = fixtures.among(expert.inputs[index], finals)
       self.assertEqual(found, [False] * 16 + [True] * 16)
+
+  def test_the_last_rows_of_a_whole_attempt_are_of_success(self):
+    shown = fixtures.demonstrations()
+    cut = shown["reach"].is_last
+    cut[-1] = False  # the last attempt has no end
+    agent = make_agent(
+      shown=shown, **{"final_rows": 3, "reward.final_share": 1.0}
+    )
+    for index, part in enumerate(shown.values()):
+      ends = np.flatnonzero(part.is_last)
+      held = part.observation[np.concatenate([ends - i for i in range(3)])]
+      drawn = [agent.batches.draw(0).expert.inputs[index] for _ in range(9)]
+      self.assertTrue(all(fixtures.among(torch.cat(drawn), held)))
+      self.assertLen(torch.cat(drawn).unique(dim=0), len(held))
 
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
     share = {"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}

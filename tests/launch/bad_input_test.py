@@ -60,6 +60,10 @@ _COLLECTION = (
   ("--output=new --collection=film", "one of <reset|play>"),
   ("--output=new --pairs_per_task=0", "0 is not a positive integer"),
   ("--output=new --final_pairs=-1", "-1 is not a non-negative integer"),
+  (
+    "--output=new --attempts_per_task=5 --pairs_per_task=9",
+    "--attempts_per_task=5; valid: 0 with --pairs_per_task",
+  ),
   ("--output=new --keep_longest_of=0", "0 is not a positive integer"),
   ("--output=new --keep_longest_of=2 --collection=play", "valid: 1 with"),
   ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),

@@ -51,6 +51,10 @@ class CollectDemonstrationsTest(shared.FolderTest):
     self.assertLen(found, 7)
     self.assertTrue(found.is_last[5:].all())
 
+  def test_whole_attempts_can_be_counted_instead(self):
+    self._call("--task=reach --attempts_per_task=2 --output=data")
+    self.assertEqual(self._read("data", "reach").attempts, 2)
+
   def test_a_policy_demonstrates_with_sampled_actions(self):
     policy = _ROOT / "results" / "policies" / "stack"
     line = f"--expert={policy} --output=data --control_hz=5"

@@ -150,11 +150,18 @@ class ConfigTest(parameterized.TestCase):
       resolve(*arguments.split())
     self.assertIn(message, str(caught.exception))
 
-  def test_only_the_block_tasks_have_mirror_images(self):
+  def test_only_the_block_tasks_have_symmetries(self):
     images = "--config.mirror_demonstrations"
     self.assertTrue(resolve(images).mirror_demonstrations)
-    with self.assertRaisesRegex(ValueError, "mirror_demonstrations is True"):
-      resolve(images, "--config.environment=package.module:factory")
+    for symmetry in (images, "--config.shifted_copies=1"):
+      with self.assertRaisesRegex(
+        ValueError, "is (True; valid: False|1; valid: 0) with environment"
+      ):
+        resolve(symmetry, "--config.environment=package.module:factory")
+
+  def test_pairs_and_attempts_are_not_both_counted(self):
+    with self.assertRaisesRegex(ValueError, "attempts_per_task is 5; valid: 0"):
+      resolve("--config.attempts_per_task=5", "--config.pairs_per_task=9")
 
   def test_a_value_of_another_type_is_a_flag_error(self):
     with self.assertRaises(flags.IllegalFlagValueError):
@@ -199,7 +206,7 @@ class FlagfilesTest(parameterized.TestCase):
     for algorithm in configs.ALGORITHMS:
       config = resolve(f"--flagfile={_FLAGS / algorithm}.flags")
       self.assertEqual(config.algorithm, algorithm)
-    self.assertLessEqual(len(list(_FLAGS.iterdir())), 15)
+    self.assertLessEqual(len(list(_FLAGS.iterdir())), 16)
 
   @parameterized.parameters(
     ("stack", "move_object"),

@@ -29,22 +29,48 @@ class DatasetsTest(fixtures.RunTest):
       self.assertLen(shown["stack"], pairs)
       self.assertLen(shown["move_object"], 15)
 
+  def test_attempts_are_copied_elsewhere_after_their_images(self):
+    dataset = fixtures.write_dataset(
+      self.folder / "shown", ("stack", "bring"), 59, 4, pairs=20
+    )
+    config = fixtures.small_config(
+      dataset,
+      environment="",
+      main_task="stack",
+      mirror_demonstrations=True,
+      shifted_copies=2,
+      attempts_per_task=1,
+    )
+    shown, again = (
+      datasets.load(config, ["stack", "bring"], (59, 4)) for _ in range(2)
+    )
+    self.assertEqual(shown["stack"].attempts, 6)
+    self.assertEqual(shown["bring"].attempts, 2)
+    np.testing.assert_array_equal(
+      shown["stack"].observation, again["stack"].observation
+    )
+
   def test_collects_into_a_folder_with_blanks(self):
     folder = self.folder / "it's mine; really"
     config = self.config(
       demonstrations=str(folder), collect_pairs=30, environment="",
       main_task="lift",
     )  # fmt: skip
-    done = mock.Mock(returncode=1)
     with (
-      mock.patch.object(subprocess, "run", return_value=done) as run,
+      mock.patch.object(subprocess, "Popen") as popen,
       mock.patch("builtins.print") as printed,
-      self.assertRaisesRegex(UserError, "could not be collected"),
     ):
-      datasets.load(config, ["lift"], (59, 4))
-    self.assertIn(f"--output={folder}", run.call_args.args[0])
+      process = popen.return_value.__enter__.return_value
+      process.wait.return_value = 1
+      with self.assertRaisesRegex(UserError, "could not be collected"):
+        datasets.load(config, ["lift"], (59, 4))
+      process.wait.side_effect = [KeyboardInterrupt, 130]
+      with self.assertRaises(KeyboardInterrupt):
+        datasets.load(config, ["lift"], (59, 4))
+      process.terminate.assert_called_once()  # and not killed
+    self.assertIn(f"--output={folder}", popen.call_args.args[0])
     shown = shlex.split(printed.call_args.args[0].partition(": ")[2])
-    self.assertEqual(shown[2:], run.call_args.args[0][2:])
+    self.assertEqual(shown[2:], popen.call_args.args[0][2:])
 
   def test_published_examples_are_read_like_a_dataset(self):
     data = pathlib.Path(__file__).parents[1] / "data"

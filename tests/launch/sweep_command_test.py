@@ -39,11 +39,11 @@ class SweepCommandTest(FolderTest):
     self.assertEqual(row["state"], "stopped")
     self.assertGreater(float(row["wall_s"]), 0)
     self.assertNotEmpty(os.listdir(run / "checkpoints"))
-    self.assertTrue((run / "learning_curve.png").exists())
     self.assertIn("stopped at", log.read_text())
     done = self._call()
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 3000", log.read_text())
+    self.assertTrue((run / "learning_curve.png").exists())
     row = sweep_fixtures.index(self.folder)["lfgp_right_0"]
     self.assertEqual((row["state"], row["env_step"]), ("done", "3000"))
     self.assertNotEmpty(row["success"])

@@ -137,6 +137,10 @@ class TrainingTest(fixtures.RunTest):
     ({"environment": "nothing.at:all"}, "No module named 'nothing'"),
     ({"device": "abacus"}, "config.device is 'abacus'"),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
+    (
+      {"attempts_per_task": 61},
+      r"fewer attempts of right \(\d+\), left \(\d+\)",
+    ),
     ({"main_task": "up"}, "up.hdf5: missing"),
     ({"agent.networks.hidden_size": 10**6}, "hidden_size is 1000000: it needs"),
     ({"agent.networks.hidden_size": 10**12}, "hidden_size is 1000000000000"),

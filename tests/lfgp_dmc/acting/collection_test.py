@@ -123,6 +123,20 @@ class CollectTest(parameterized.TestCase):
       self.assertTrue((reached > 0.6).all())
 
   @parameterized.parameters("reset", "play")
+  def test_whole_attempts_can_be_counted_instead(self, kind):
+    plain = _arrays(_collect(_plan(), kind, pairs=90))
+    found = collection.collect(
+      _plan(), kind, toy.TASKS, 1, progress=False, attempts=7
+    )
+    for task in toy.TASKS:
+      data = found[task].demonstrations
+      self.assertEqual(data.attempts, 7)
+      self.assertTrue(data.is_last[-1])
+      self.assertLen(np.unique(data.episode), 7)
+      for name, array in plain[task].items():
+        np.testing.assert_array_equal(array[: len(data)], data.arrays()[name])
+
+  @parameterized.parameters("reset", "play")
   def test_only_successes_are_kept(self, kind):
     found = _collect(_plan(), kind, ("right",), pairs=200)
     data = found["right"].demonstrations

@@ -73,6 +73,13 @@ class DemonstrationsTest(fixtures.FolderTest):
     )
     self.assertLen(read.head(4), 4)
 
+  def test_the_first_whole_attempts(self):
+    self.assertEqual(_DATA.attempts, 1)  # the second is cut
+    for wanted in (1, 2):
+      first = _DATA.head_attempts(wanted)
+      np.testing.assert_array_equal(first.action, _DATA.action[:3])
+      self.assertTrue(first.is_last[-1])
+
   def test_the_same_data_are_the_same_bytes(self):
     self._write()
     first = self._path.read_bytes()
