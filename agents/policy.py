@@ -1,5 +1,6 @@
 """A stored policy, and the one implementation of acting with intentions."""
 
+import dataclasses
 import json
 import os
 from collections.abc import Mapping, Sequence
@@ -16,6 +17,7 @@ from pydantic import Field
 from lfgp_dmc.agents import fields, serialisation
 from lfgp_dmc.agents.fields import NetworksConfig
 from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data import files
@@ -30,6 +32,13 @@ class PolicyOptions(NetworksConfig):
   observation_size: fields.PositiveInt
   action_size: fields.PositiveInt
   tanh_feature_scale: fields.NonNegative = 0.0
+  # Of an encoder: [C, H, W, 3] of frames, of which it makes the last features
+  # of an observation, and its channels.
+  frame_shape: list[fields.PositiveInt] = dataclasses.field(
+    default_factory=list
+  )
+  features: fields.Count = 0
+  channels: fields.Count = 0
   env_step: fields.Count = 0  # how long it was trained
 
 
@@ -71,13 +80,23 @@ class Policy:
     except pydantic.ValidationError as error:
       faults = fields.faults(error, options, POLICY_FIELD)
       raise ValueError("; ".join(faults)) from None
+    encoder, unused = None, torch.Generator()
+    if checked.frame_shape:
+      encoder = Encoder(
+        checked.observation_size - checked.features,
+        checked.frame_shape,
+        checked.features,
+        checked.channels,
+        unused,
+      )
     network = layouts.make_intentions(
       checked.layout,
       Standardiser(checked.observation_size, checked.tanh_feature_scale),
       len(checked.tasks),
       checked.hidden_size,
       checked.action_size,
-      torch.Generator(),
+      unused,
+      encoder=encoder,
     )
     serialisation.load_module_state(network, arrays, "policy arrays")
     return cls(network.requires_grad_(False), checked.tasks)
@@ -137,8 +156,15 @@ class Policy:
 
   def options(self) -> dict[str, Any]:
     """The JSON-able options that `from_arrays` takes beside the arrays."""
-    network = self._network
-    return {
+    network, encoder = self._network, self.encoder
+    seen = {}
+    if encoder is not None:
+      seen = {
+        "frame_shape": list(encoder.frame_shape),
+        "features": encoder.features,
+        "channels": encoder.channels,
+      }
+    return seen | {
       "tasks": list(self.tasks),
       "observation_size": network.standardiser.mean.shape[0],
       "action_size": self.action_size,
@@ -146,6 +172,11 @@ class Policy:
       "layout": layouts.layout_of(network.heads),
       "tanh_feature_scale": network.standardiser.tanh_feature_scale,
     }
+
+  @property
+  def encoder(self) -> Encoder | None:
+    """What turns frames into features, if it acts from pixels."""
+    return self._network.encoder
 
   @property
   def action_size(self) -> int:
@@ -172,7 +203,7 @@ class Policy:
     """Chooses actions: raw float32 [O] or [B, O] -> [A] or [B, A] in [-1, 1].
 
     Args:
-      observation: one, or a batch.
+      observation: one, or a batch; with an encoder, its pixels or features.
       task: whose intention acts; None: the task that `begin` named.
       deterministic: tanh(mean), or a sample; None: the policy's own setting.
       generator: source of the sample; None: the one that `begin` seeded.
@@ -189,12 +220,18 @@ class Policy:
       )
       network = self._network
       width = network.standardiser.mean.shape[0]
-      if raw.dim() not in (1, 2) or raw.shape[-1] != width:
+      rows = raw if raw.dim() > 1 else raw[None]
+      encoder = network.encoder
+      if encoder is not None and rows.shape[-1] != width:
+        width = encoder.observation_size
+      if raw.dim() not in (1, 2) or rows.shape[-1] != width:
         raise ValueError(
           f"observation has shape {tuple(raw.shape)}; valid: ({width},) or "
           f"(B, {width})"
         )
-      inputs = network.standardiser(raw if raw.dim() > 1 else raw[None])
+      if encoder is not None and width == encoder.observation_size:
+        rows = encoder.observe(rows)
+      inputs = network.standardiser(rows)
       mean, std = network.heads.one(network.trunk(inputs), index)
       if not deterministic:
         source = self._generator if generator is None else generator

@@ -11,7 +11,7 @@ import tempfile
 from absl import flags
 
 import lfgp_dmc
-from lfgp_dmc.acting import collection
+from lfgp_dmc.acting import collection, environments
 from lfgp_dmc.acting.attempts import CollectionPlan
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
@@ -54,6 +54,13 @@ _WORKERS = flags.DEFINE_integer(
 
 _HERTZ = flags.DEFINE_integer(
   "control_hz", 20, "Control steps a second: 20, 10 or 5."
+)
+
+_CAMERA = flags.DEFINE_integer(
+  "camera_size",
+  0,
+  "Pairs from pixels: the side of the cameras' frames; 0: the 59 floats.",
+  lower_bound=0,
 )
 
 
@@ -111,14 +118,20 @@ def _plan() -> CollectionPlan:
       f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
       f"--task={_TASK.value}; it can do: {', '.join(spec.tasks)}"
     )
+  options, shape = {"control_hz": _HERTZ.value}, ()
+  if _CAMERA.value:
+    options |= {"observations": "all", "camera_size": _CAMERA.value}
+    with command.checked_input():
+      shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
   return CollectionPlan(
-    functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),
+    functools.partial(lfgp_dmc.load, **options),
     make_actor,
     _TASK.value,
     tasks,
     _SEED.value,
     _HERTZ.value,
     keep_longest_of=_LONGEST.value,
+    frame_shape=shape,
   )
 
 

@@ -43,6 +43,8 @@ class RunConfig:
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: Text = ""
   control_hz: PositiveInt = 20  # of the block tasks: 20, 10 or 5 steps a second
+  # From pixels: the side of the block tasks' frames; 0: from the 59 floats.
+  camera_size: Count = 0
   episode_steps: Count = 0  # at most; 0: 18 s
 
   # Acting and updates; not of behaviour cloning.
@@ -100,6 +102,11 @@ class RunConfig:
         "mirror_demonstrations is True; valid: False with environment (only "
         "the block tasks' mirror image is known)"
       )
+    if self.camera_size and self.mirror_demonstrations:
+      yield (
+        "mirror_demonstrations is True; valid: False with camera_size (frames "
+        "have no mirror image)"
+      )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"
@@ -119,7 +126,9 @@ class RunConfig:
   @property
   def environment_spec(self) -> EnvironmentSpec:
     """Where the agent acts."""
-    return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
+    return EnvironmentSpec(
+      self.main_task, self.environment, self.control_hz, self.camera_size
+    )
 
   @property
   def most_episode_steps(self) -> int:

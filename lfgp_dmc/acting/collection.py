@@ -20,6 +20,7 @@ from lfgp_dmc.acting import workers as work
 from lfgp_dmc.acting.attempts import Attempt, CollectionPlan, Collector, Job
 from lfgp_dmc.data.demonstration_checks import COLLECTIONS
 from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.frames import FrameFile
 from lfgp_dmc.types import Transition
 
 _CHUNK = 8  # reset-based attempts a job
@@ -73,7 +74,8 @@ def collect(
       raise ValueError(
         f"{task!r} is not a task of T_all: {', '.join(plan.tasks)}"
       )
-  piles = {task: _Pile(task, pairs, finals) for task in tasks}
+  shape = plan.frame_shape
+  piles = {task: _Pile(task, pairs, finals, shape) for task in tasks}
   with tqdm.tqdm(
     total=(pairs + finals) * len(piles), unit="pair", disable=not progress
   ) as bar:
@@ -92,7 +94,8 @@ def _fill(
   """Fills the piles, one unit of work (a task, or play) after the other."""
   left = list(units)
   make = functools.partial(Collector, plan)
-  with contextlib.closing(work.ordered(make, _jobs(left), workers)) as results:
+  results = work.ordered(make, _jobs(left), workers, bool(plan.frame_shape))
+  with contextlib.closing(results):
     for unit in units:
       wanted = piles if unit is None else {unit: piles[unit]}
       bar.set_description(unit or "play")
@@ -120,9 +123,10 @@ def _jobs(units: list[str | None]) -> Iterator[Job]:
 class _Pile:
   """The pairs of one task so far."""
 
-  def __init__(self, task: str, pairs: int, finals: int):
+  def __init__(self, task: str, pairs: int, finals: int, frame_shape):
     self._task, self._pairs, self._wanted = task, pairs, pairs + finals
     self._rows: list[Transition] = []
+    self._frames = FrameFile(frame_shape) if frame_shape else None
     self._stored = self._attempts = self._failures = 0
 
   @property
@@ -144,14 +148,18 @@ class _Pile:
         )
       return 0
     self._failures = 0
-    before = self._stored
-    if before < self._pairs:
+    length = len(attempt.rows.action)
+    if self._stored < self._pairs:
+      kept = slice(0, min(length, self._pairs - self._stored))
       self._rows.append(attempt.rows)
-      self._stored = min(before + len(attempt.rows.action), self._pairs)
     else:
+      kept = slice(length - 1, length)
       self._rows.append(Transition(*(part[-1:] for part in attempt.rows)))
-      self._stored += 1
-    return self._stored - before
+    if self._frames is not None:
+      assert attempt.frames is not None, "the plan has frames"
+      self._frames.append(attempt.frames[kept.start : kept.stop + 1])
+    self._stored += kept.stop - kept.start
+    return kept.stop - kept.start
 
   def collected(self) -> Collected:
     """The pairs, the last attempt cut; then the extra finals."""
@@ -171,6 +179,7 @@ class _Pile:
         next_observation[kept],
         episode[kept],
         is_last[kept],
+        frames=None if self._frames is None else self._frames.mapped(),
       ),
       self._attempts,
       len(self._rows),

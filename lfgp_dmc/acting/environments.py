@@ -1,9 +1,10 @@
 """How any dm_env environment is read and driven: flat rows, widths, rewards.
 
 Our nine tasks are laid out in the order of `observations.py`, every other
-environment's floating-point observables in the order of its specification. What
-belongs to tasks (`success/`, `condition/`, `reward/`) is never an input. Agents
-act in [-1, 1]: see `with_unit_actions`.
+environment's floating-point observables in the order of its specification, and
+then its frames: `camera/NAME`, uint8 [H, W, 3], all of one size. What belongs to
+tasks (`success/`, `condition/`, `reward/`) is never an input. Agents act in
+[-1, 1]: see `with_unit_actions`.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -44,6 +45,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
+  names += [n for n in spec if n.startswith(observations.CAMERA_PREFIX)]
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -55,6 +57,24 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     return np.concatenate(parts, dtype=np.float32)
 
   return flatten
+
+
+def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
+  """[C, H, W, 3] of the cameras' frames; empty without cameras.
+
+  Raises:
+    ValueError: frames are not uint8 [H, W, 3], or of several sizes.
+  """
+  spec: Any = environment.observation_spec()
+  names = spec if isinstance(spec, Mapping) else ()
+  found = [spec[n] for n in names if n.startswith(observations.CAMERA_PREFIX)]
+  kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
+  if not kinds:
+    return ()
+  (shape, dtype), *others = kinds
+  if others or dtype != "uint8" or shape[2:] != (3,):
+    raise ValueError(f"frames are {kinds}; valid: uint8 [H, W, 3] of one size")
+  return (len(found), *shape)
 
 
 def with_unit_actions(environment: dm_env.Environment) -> dm_env.Environment:

@@ -8,8 +8,10 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from typing import Any
+
+from lfgp_dmc import graphics
 
 # Set before a worker imports anything.
 _VARIABLES = {
@@ -17,7 +19,7 @@ _VARIABLES = {
   "MKL_NUM_THREADS": "1",
   "OPENBLAS_NUM_THREADS": "1",
   "OMP_WAIT_POLICY": "PASSIVE",
-  "MUJOCO_GL": "off",
+  "LP_NUM_THREADS": "0",  # of Mesa's software GL
 }
 
 
@@ -25,6 +27,7 @@ def ordered(
   make_state: Callable[[], Callable[[Any], Any]],
   jobs: Iterable[Any],
   workers: int,
+  draws: bool = False,
 ) -> Generator[Any, None, None]:
   """Yields `make_state()(job)` for each job, in order.
 
@@ -35,6 +38,7 @@ def ordered(
     jobs: finite or endless: a few are in flight, and closing the generator
       ends the processes.
     workers: processes; 1 works in this one.
+    draws: whether they make pictures.
   """
   if workers == 1:
     state = make_state()
@@ -44,8 +48,10 @@ def ordered(
       if hasattr(state, "close"):
         state.close()
     return
+  if draws:
+    graphics.allow_pictures()
   jobs = iter(jobs)
-  with _variables():
+  with _variables({} if draws else {"MUJOCO_GL": "off"}):
     pool = concurrent.futures.ProcessPoolExecutor(
       workers,
       mp_context=multiprocessing.get_context("spawn"),
@@ -90,14 +96,15 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def _variables() -> Iterator[None]:
+def _variables(more: Mapping[str, str]) -> Iterator[None]:
   """Sets the variables that spawned processes inherit, then restores ours.
 
   A worker's initializer would set them too late: unpickling its arguments
   imports.
   """
-  before = {name: os.environ.get(name) for name in _VARIABLES}
-  os.environ.update(_VARIABLES)
+  ours = {**_VARIABLES, **more}
+  before = {name: os.environ.get(name) for name in ours}
+  os.environ.update(ours)
   try:
     yield
   finally:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSIONS = (1, 2)  # without and with frames
+FRAMES = "frames"
 COLLECTIONS = ("reset", "play")
 
 # Dataset name -> dtype. The shapes follow from N and the two widths.
@@ -34,6 +35,34 @@ def of_arrays(
   return faults or _wrong_values(arrays) + _wrong_episodes(arrays)
 
 
+def of_frames(
+  frames: np.ndarray | None, episode: np.ndarray, shape: tuple[int, ...] | None
+) -> list[str]:
+  """Faults of the frames of checked arrays.
+
+  Args:
+    frames: uint8 [N + E, C, H, W, 3]; None if there are none.
+    episode: int32 [N], of E episodes.
+    shape: the expected [C, H, W, 3], empty for no frames; None accepts any.
+  """
+  if frames is None:
+    return [f"has no frames; valid: {list(shape)}"] if shape else []
+  if shape == ():
+    return ["has frames; valid: none (config.camera_size is 0)"]
+  rows = len(episode) + len(np.unique(episode))
+  found = frames.shape
+  wanted = shape or found[1:]
+  if frames.dtype != np.uint8:
+    return [f"'frames' is {frames.dtype}; valid: uint8"]
+  if len(wanted) != 4 or wanted[3] != 3 or found != (rows, *wanted):
+    valid = list(shape or ("C", "H", "W", 3))
+    return [
+      f"'frames' has shape {list(found)}; valid: {[rows, *valid]}, one a pair "
+      "and one more an episode"
+    ]
+  return []
+
+
 def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
   """Faults of the attributes; `task` is the expected one (None: any)."""
   faults = [f"missing attribute {k!r}" for k in _VALID if k not in attributes]
@@ -60,7 +89,10 @@ def _is_number(value: Any, kind: type = np.number) -> bool:
 
 # Attribute -> its check, and what is valid.
 _VALID = {
-  "schema_version": (lambda v: v == SCHEMA_VERSION, SCHEMA_VERSION),
+  "schema_version": (
+    lambda v: v in SCHEMA_VERSIONS,
+    " or ".join(map(str, SCHEMA_VERSIONS)),
+  ),
   "task": (_is_name, "a name"),
   "main_task": (_is_name, "a name"),
   "collection": (lambda v: v in COLLECTIONS, ", ".join(COLLECTIONS)),

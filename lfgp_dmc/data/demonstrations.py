@@ -6,6 +6,11 @@ row belongs to, never decreasing), `is_last` bool [N] (the row of success; an
 attempt cut by the exact count has none), and the attributes `schema_version`,
 `task`, `main_task`, `collection`, `expert`, `seed`, `control_hz`. Your own
 arrays become such a file by `write("stack.hdf5", Demonstrations(...), {...})`.
+
+With pixels (version 2), an observation is what a robot senses, and `frames`
+uint8 [N + E, C, H, W, 3] holds those of each row, and after an episode's last
+row those that it led to: each is stored once. Reading checks and unpacks them
+into an unnamed file, where any row is at hand without being in memory.
 """
 
 import dataclasses
@@ -19,7 +24,9 @@ import numpy as np
 
 from lfgp_dmc.data import demonstration_checks as checks
 from lfgp_dmc.data import files
+from lfgp_dmc.data.frames import FrameFile
 
+_BLOCK = 16  # frames that are compressed together
 SUFFIX = ".hdf5"
 
 
@@ -37,6 +44,7 @@ class Demonstrations:
   episode: np.ndarray  # int32 [N]
   is_last: np.ndarray  # bool [N]
   attributes: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+  frames: np.ndarray | None = None  # uint8 [N + E, C, H, W, 3]
 
   def __len__(self) -> int:
     """The number of pairs N."""
@@ -49,7 +57,15 @@ class Demonstrations:
   def head(self, pairs: int) -> "Demonstrations":
     """The first `pairs` pairs."""
     cut = {name: array[:pairs] for name, array in self.arrays().items()}
-    return Demonstrations(**cut, attributes=self.attributes)
+    frames = self.frames
+    if frames is not None:
+      frames = frames[: self.frame_rows()[:pairs][-1] + 2]
+    return Demonstrations(**cut, attributes=self.attributes, frames=frames)
+
+  def frame_rows(self) -> np.ndarray:
+    """Where in `frames` each row's are, int64 [N]; the next row's follow."""
+    begins = np.diff(self.episode, prepend=self.episode[:1]) > 0
+    return np.arange(len(self)) + np.cumsum(begins)
 
 
 def create_folder(path: files.Path) -> pathlib.Path:
@@ -89,12 +105,12 @@ def write(
   """
   path = pathlib.Path(path)
   attributes = {
-    "schema_version": checks.SCHEMA_VERSION,
+    "schema_version": checks.SCHEMA_VERSIONS[demonstrations.frames is not None],
     **(demonstrations.attributes if attributes is None else attributes),
   }
   arrays = demonstrations.arrays()
   faults = checks.of_attributes(attributes, None)
-  faults += checks.of_arrays(arrays, None, None)
+  faults += _faults(arrays, demonstrations.frames)
   if faults:
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
@@ -102,6 +118,8 @@ def write(
   with files.replacing(path) as aside, h5py.File(aside, "w") as file:
     for name, array in arrays.items():
       file.create_dataset(name, data=array)
+    if demonstrations.frames is not None:
+      _write_frames(file, demonstrations.frames)
     for name, value in attributes.items():
       file.attrs[name] = value
 
@@ -111,8 +129,9 @@ def read(
   task: str | None = None,
   observation_size: int | None = None,
   action_size: int | None = None,
+  frame_shape: tuple[int, ...] | None = None,
 ) -> Demonstrations:
-  """Reads and checks one file, whose task, O and A may be any if None.
+  """Reads and checks one file; its task, O, A and [C, H, W, 3] if not None.
 
   Raises:
     DatasetError: it is missing, damaged or breaks the contract; the message
@@ -123,15 +142,17 @@ def read(
     raise DatasetError(f"{path}: missing")
   try:
     arrays, attributes = _read_all(path)
+    frames = arrays.pop(checks.FRAMES, None)
   except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
-  faults += checks.of_arrays(arrays, observation_size, action_size)
+  sizes = observation_size, action_size
+  faults += _faults(arrays, frames, *sizes, frame_shape)
   if faults:
     raise DatasetError(f"{path}: {'; '.join(faults)}")
   known = {name: arrays[name] for name in checks.DTYPES}
-  return Demonstrations(**known, attributes=attributes)
+  return Demonstrations(**known, attributes=attributes, frames=frames)
 
 
 def read_folder(
@@ -139,6 +160,7 @@ def read_folder(
   tasks: Sequence[str],
   observation_size: int | None = None,
   action_size: int | None = None,
+  frame_shape: tuple[int, ...] | None = None,
 ) -> dict[str, Demonstrations]:
   """Reads the files of several tasks, in their order; see `read`.
 
@@ -158,7 +180,8 @@ def read_folder(
       missing.append(f"{path}: missing")
       continue
     try:
-      found[task] = read(path, task, observation_size, action_size)
+      sizes = observation_size, action_size, frame_shape
+      found[task] = read(path, task, *sizes)
     except DatasetError as error:
       damaged.append(str(error))
   if damaged or missing:
@@ -198,8 +221,40 @@ def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
     for name in checks.DTYPES:
       if name in file and isinstance(file[name], h5py.Dataset):
         arrays[name] = file[name][()]
+    if isinstance(frames := file.get(checks.FRAMES), h5py.Dataset):
+      arrays[checks.FRAMES] = _unpacked(frames)
     attributes = {
       name: value.item() if isinstance(value, np.generic) else value
       for name, value in file.attrs.items()
     }
   return arrays, attributes
+
+
+def _faults(arrays, frames, observation_size=None, action_size=None, shape=None):
+  faults = checks.of_arrays(arrays, observation_size, action_size)
+  return faults or checks.of_frames(frames, arrays["episode"], shape)
+
+
+def _write_frames(file: h5py.File, frames: np.ndarray) -> None:
+  """Block by block, with a checksum on each."""
+  stored = file.create_dataset(
+    checks.FRAMES,
+    frames.shape,
+    np.uint8,
+    chunks=(min(_BLOCK, len(frames)), *frames.shape[1:]),
+    compression="gzip",
+    compression_opts=1,
+    fletcher32=True,
+  )
+  for start in range(0, len(frames), _BLOCK):
+    stored[start : start + _BLOCK] = frames[start : start + _BLOCK]
+
+
+def _unpacked(stored: h5py.Dataset) -> np.ndarray:
+  """Frames in an unnamed file; as they are if they are none."""
+  if stored.ndim != 5 or stored.dtype != np.uint8:
+    return stored[:0]
+  unpacked = FrameFile(stored.shape[1:])
+  for start in range(0, len(stored), _BLOCK):
+    unpacked.append(stored[start : start + _BLOCK])
+  return unpacked.mapped()
