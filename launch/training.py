@@ -31,7 +31,7 @@ def train(
     raise UserError(
       f"{path} exists; continue it with --resume, or choose another --run"
     )
-  parts = assemble.make_parts(config)
+  parts = assemble.make_parts(config, path if resume else None)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
     print(

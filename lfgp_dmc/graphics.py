@@ -68,7 +68,7 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
 
 
 def allow_pictures() -> None:
-  """Undoes a `choose_backend(render=False)` once frames are wanted after all."""
+  """Undoes a `choose_backend(render=False)`: frames are wanted after all."""
   if _off_is_ours:
     os.environ.pop(_GL, None)
     choose_backend()

@@ -46,7 +46,7 @@ class PixelPairs(SplitPairs):
   def batch(
     self, rows: torch.Tensor, generator: np.random.Generator | None = None
   ) -> ExpertBatch:
-    """Gathers rows [K, B], each k of one task; shifts if there is a generator."""
+    """Gathers rows [K, B], each k of one task; a generator shifts frames."""
     own, action = super().batch(rows)
     frames = np.stack([self._gather(of_task) for of_task in rows.cpu().numpy()])
     if generator is not None:
@@ -66,4 +66,6 @@ class PixelPairs(SplitPairs):
     """All validation pairs of task `index`: [1, N, ...]."""
     rows = torch.from_numpy(self.validation_rows[index]).to(self._device)
     parts = [self.batch(part[None]) for part in rows.split(_ROWS)]
-    return ExpertBatch(*(torch.cat(part, 1) for part in zip(*parts, strict=True)))
+    return ExpertBatch(
+      *(torch.cat(part, 1) for part in zip(*parts, strict=True))
+    )

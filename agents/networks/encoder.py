@@ -6,7 +6,7 @@ picture's places, and its mean place is what goes on. Random shifts as in DrQ
 (Kostrikov et al., 2020).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import torch
@@ -18,7 +18,8 @@ from lfgp_dmc.agents.networks.linear import initialise_, make_linear
 
 # Side of the kernel, stride of each layer.
 _LAYERS = ((5, 2), (3, 2), (3, 1))
-SMALLEST = 17  # pixels a side, of which the last layer has one place left
+_ROWS = 256  # encoded at a time
+_SMALLEST = 17  # pixels a side, of which the last layer has one place left
 
 
 @checked
@@ -49,8 +50,16 @@ class Encoder(nn.Module):
       features: F.
       channels: of each convolution.
       generator: of the weights.
+
+    Raises:
+      ValueError: frames are too small.
     """
     super().__init__()
+    if min(frame_shape[1:3]) < _SMALLEST:
+      raise ValueError(
+        f"frames have shape {list(frame_shape)}; valid: sides of {_SMALLEST} "
+        "pixels or more"
+      )
     self.floats, self.frame_shape = floats, tuple(frame_shape)
     self.channels, self.features = channels, features
     cameras, *sides, inputs = self.frame_shape
@@ -78,7 +87,7 @@ class Encoder(nn.Module):
 
   def forward(self, frames: torch.Tensor) -> torch.Tensor:
     """Features [B, F] of frames [B, C, H, W, 3], 0 to 255, in their dtype."""
-    cameras, height, width, _ = self.frame_shape
+    _, height, width, _ = self.frame_shape
     hidden = frames.reshape(-1, height, width, 3).permute(0, 3, 1, 2)
     hidden = hidden / 127.5 - 1.0
     for layer in self.layers:
@@ -129,3 +138,20 @@ def shifted(
   for i, (y, x) in enumerate(offsets):
     moved[i] = padded[i, y : y + height, x : x + width]
   return moved.reshape(frames.shape)
+
+
+def as_function(encoder: Encoder) -> Callable[[np.ndarray], np.ndarray]:
+  """The frozen encoder: frames uint8 [N, C, H, W, 3] -> float32 [N, F]."""
+  encoder.requires_grad_(False)
+
+  def encode(frames: np.ndarray) -> np.ndarray:
+    device = encoder.output.weight.device
+    made = np.empty((len(frames), encoder.features), np.float32)
+    with torch.inference_mode():
+      for start in range(0, len(frames), _ROWS):
+        some = torch.from_numpy(np.array(frames[start : start + _ROWS]))
+        features = encoder(some.to(device).float())
+        made[start : start + _ROWS] = features.cpu().numpy()
+    return made
+
+  return encode

@@ -90,7 +90,11 @@ class IntentionNetwork(nn.Module):
     """The parameters that the intentions' losses train."""
     trunk = list(self.trunk.parameters()) if self.owns_trunk else []
     seen = self.encoder.parameters() if self.encoder is not None else ()
-    return [*trunk, *self.heads.parameters(), *(p for p in seen if p.requires_grad)]
+    return [
+      *trunk,
+      *self.heads.parameters(),
+      *(p for p in seen if p.requires_grad),
+    ]
 
   def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Mean and std [K, B, A] for inputs [B, O] or [K, B, O]."""

@@ -2,7 +2,7 @@
 
 Our nine tasks are laid out in the order of `observations.py`, every other
 environment's floating-point observables in the order of its specification, and
-then its frames: `camera/NAME`, uint8 [H, W, 3], all of one size. What belongs to
+then its frames: `camera/NAME`, uint8 [H, W, 3], of one size. What belongs to
 tasks (`success/`, `condition/`, `reward/`) is never an input. Agents act in
 [-1, 1]: see `with_unit_actions`.
 """
@@ -21,6 +21,8 @@ TASK_PREFIXES = (
   observations.CONDITION_PREFIX,
   observations.REWARD_PREFIX,
 )
+
+_FEATURES = "features"
 
 Flattener = Callable[[Any], np.ndarray]
 
@@ -45,7 +47,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
-  names += [n for n in spec if n.startswith(observations.CAMERA_PREFIX)]
+  names += filter(_is_frame, spec)
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -67,7 +69,7 @@ def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
   """
   spec: Any = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
-  found = [spec[n] for n in names if n.startswith(observations.CAMERA_PREFIX)]
+  found = [spec[name] for name in filter(_is_frame, names)]
   kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
   if not kinds:
     return ()
@@ -118,6 +120,58 @@ class _UnitActions:
     share = (np.clip(np.reshape(action, self._spec.shape), -1, 1) + 1) / 2
     scaled = (1 - share) * low + share * high
     return self._environment.step(scaled.astype(self._spec.dtype))
+
+
+def with_features(
+  environment: dm_env.Environment, encode: Callable[[np.ndarray], np.ndarray]
+) -> dm_env.Environment:
+  """The environment, with the observable `features` in the place of frames.
+
+  `encode` maps frames uint8 [N, C, H, W, 3] to float32 [N, F].
+  """
+  made: Any = _Features(environment, encode)
+  return made
+
+
+class _Features:
+  """An environment whose frames are encoded; all else is its own."""
+
+  def __init__(self, environment: Any, encode):
+    self._environment, self._encode = environment, encode
+
+  def __getattr__(self, name: str) -> Any:
+    if name.startswith("__"):
+      raise AttributeError(name)
+    return getattr(self._environment, name)
+
+  def observation_spec(self) -> dict[str, specs.Array]:
+    """The environment's own, without frames, with `features`."""
+    spec = self._environment.observation_spec()
+    frames = np.zeros((1, *frame_shape(self._environment)), np.uint8)
+    kept = {name: part for name, part in spec.items() if not _is_frame(name)}
+    shape = self._encode(frames)[0].shape
+    return {**kept, _FEATURES: specs.Array(shape, np.float32, _FEATURES)}
+
+  def reset(self) -> dm_env.TimeStep:
+    """Starts an episode."""
+    return self._encoded(self._environment.reset())
+
+  def step(self, action: np.ndarray) -> dm_env.TimeStep:
+    """One step."""
+    return self._encoded(self._environment.step(action))
+
+  def _encoded(self, timestep: dm_env.TimeStep) -> dm_env.TimeStep:
+    seen = timestep.observation
+    kept = {name: value for name, value in seen.items() if not _is_frame(name)}
+    frames = np.stack(
+      [value for name, value in seen.items() if _is_frame(name)]
+    )
+    kept[_FEATURES] = self._encode(frames[None])[0]
+    return timestep._replace(observation=kept)
+
+
+def _is_frame(name: str) -> bool:
+  return name.startswith(observations.CAMERA_PREFIX)
 
 
 def reseeded(

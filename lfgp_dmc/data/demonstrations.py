@@ -230,7 +230,9 @@ def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
   return arrays, attributes
 
 
-def _faults(arrays, frames, observation_size=None, action_size=None, shape=None):
+def _faults(
+  arrays, frames, observation_size=None, action_size=None, shape=None
+):
   faults = checks.of_arrays(arrays, observation_size, action_size)
   return faults or checks.of_frames(frames, arrays["episode"], shape)
 

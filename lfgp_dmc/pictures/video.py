@@ -98,6 +98,21 @@ def label(
   return np.asarray(image)
 
 
+def inset(frame: np.ndarray, views: Sequence[np.ndarray]) -> np.ndarray:
+  """Sets views uint8 [h, w, 3] into the lower left corner of a copy.
+
+  Side by side, each a quarter of the frame's height, pixels as they are.
+  """
+  frame = frame.copy()
+  side = frame.shape[0] // 4
+  for i, view in enumerate(views):
+    square = Image.fromarray(view).resize(
+      (side, side), Image.Resampling.NEAREST
+    )
+    frame[-side:, i * side : (i + 1) * side] = np.asarray(square)
+  return frame
+
+
 def _checked(frames: Sequence[np.ndarray]) -> list[Any]:
   frames = [np.asarray(frame) for frame in frames]
   if not frames:
