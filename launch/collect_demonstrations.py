@@ -120,7 +120,9 @@ def _plan() -> CollectionPlan:
     )
   options, shape = {"control_hz": _HERTZ.value}, ()
   if _CAMERA.value:
-    options |= {"observations": "all", "camera_size": _CAMERA.value}
+    # A policy from pixels is to see no more; other experts need the state.
+    seen = "vision" if spec.environment_spec.camera_size else "all"
+    options |= {"observations": seen, "camera_size": _CAMERA.value}
     with command.checked_input():
       shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
   return CollectionPlan(

@@ -100,8 +100,7 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   Raises:
     KeyError: a component is missing.
   """
-  is_whole = OBSERVATION_SLICES.keys() <= observation.keys()
-  if not is_whole and any(map(_is_camera, observation)):
+  if not has_state(observation) and any(map(_is_camera, observation)):
     return flatten_vision(observation)
   try:
     parts = [observation[name] for name in _BOUNDS]
@@ -111,6 +110,11 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
       f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
     ) from None
   return np.concatenate(parts, dtype=np.float32)[_FLAT]
+
+
+def has_state(observation: Mapping[str, np.ndarray]) -> bool:
+  """Whether all eleven components are there, the privileged ones too."""
+  return OBSERVATION_SLICES.keys() <= observation.keys()
 
 
 def flatten_vision(observation: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -68,7 +68,7 @@ def to_std(raw: torch.Tensor) -> torch.Tensor:
 
 
 class IntentionNetwork(nn.Module):
-  """All that acting needs: encoder (of pixels), standardisation, trunk, heads."""
+  """All that acting needs: standardisation, trunk, heads, any encoder."""
 
   def __init__(
     self,

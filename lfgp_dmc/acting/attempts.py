@@ -198,12 +198,10 @@ class Collector:
 
   def _seen(self, before: dm_env.TimeStep, step: Step) -> Transition:
     """What is stored of a step: the expert may have seen more than a robot."""
-    if not self._plan.frame_shape:
+    seen = step.timestep.observation
+    if not (self._plan.frame_shape and observations.has_state(seen)):
       return step.transition
-    first, second = (
-      observations.flatten_vision(timestep.observation)
-      for timestep in (before, step.timestep)
-    )
+    first, second = map(observations.flatten_vision, (before.observation, seen))
     return Transition(first, step.transition.action, second)
 
   def _stacked(self, task: str, steps: Sequence[Transition]) -> Attempt:
