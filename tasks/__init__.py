@@ -46,7 +46,7 @@ def load(
     observations: "features" (the eleven components), "vision" (frames of a
       front and a wrist camera, uint8, and the components that a real robot
       senses) or "all".
-    camera_size: a frame's height and width in pixels, 17 to 480.
+    camera_size: a frame's height and width in pixels, 32 to 480.
     spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
     control_hz: 20, 10 or 5 control steps a second.
     time_limit: length of an episode, s.
@@ -69,8 +69,8 @@ def load(
     raise ValueError(f"unknown option {', '.join(unknown)}; valid: {valid}")
   for name, choices in _CHOICES.items():
     _check(name, given[name], choices)
-  if not 17 <= camera_size <= 480:
-    raise ValueError(f"camera_size is {camera_size!r}; valid: 17 to 480")
+  if not 32 <= camera_size <= 480:
+    raise ValueError(f"camera_size is {camera_size!r}; valid: 32 to 480")
   if observations != "features":
     graphics.allow_pictures()
     if fault := graphics.fault():

@@ -63,14 +63,14 @@ class SeenPoint(toy.PointEnvironment):
     return {
       "clock": specs.Array((1,), np.float32),
       **dict(tasks),
-      "camera/above": specs.Array((20, 20, 3), np.uint8),
+      "camera/above": specs.Array((32, 32, 3), np.uint8),
     }
 
   def _observe(self):
     position, *tasks = super()._observe().items()
-    frame = np.zeros((20, 20, 3), np.uint8)
-    column, row = ((position[1] + 1) * 9).astype(int)
-    frame[row : row + 2, column : column + 2] = 255
+    frame = np.zeros((32, 32, 3), np.uint8)
+    column, row = ((position[1] + 1) * 14).astype(int)
+    frame[row : row + 3, column : column + 3] = 255
     clock = np.array([self._steps / 20], np.float32)
     return {"clock": clock, **dict(tasks), "camera/above": frame}
 

@@ -19,7 +19,7 @@ from lfgp_dmc.agents.networks.linear import initialise_, make_linear
 # Side of the kernel, stride of each layer.
 _LAYERS = ((5, 2), (3, 2), (3, 1))
 _ROWS = 256  # encoded at a time
-_SMALLEST = 17  # pixels a side, of which the last layer has one place left
+_SMALLEST = 32  # pixels a side, which leave the last layer 4 x 4 places
 
 
 @checked
@@ -68,6 +68,8 @@ class Encoder(nn.Module):
       self.layers.append(_conv(inputs, channels, kernel, stride, generator))
       inputs = channels
       sides = [(side - kernel) // stride + 1 for side in sides]
+    # Inverse temperatures of the keypoints; of 1, all begin in the middle.
+    self.sharpness = nn.Parameter(torch.full((channels, 1), 10.0))
     self.output = make_linear(2 * cameras * channels, features, generator)
     self.norm = nn.LayerNorm(features)
     places = [torch.linspace(-1, 1, side) for side in sides]
@@ -92,7 +94,7 @@ class Encoder(nn.Module):
     hidden = hidden / 127.5 - 1.0
     for layer in self.layers:
       hidden = layer(hidden).relu_()
-    shares = hidden.float().flatten(2).softmax(-1)
+    shares = (hidden.float().flatten(2) * self.sharpness).softmax(-1)
     keypoints = (shares @ self._places).view(len(frames), -1)
     return torch.tanh(self.norm(self.output(keypoints)))
 

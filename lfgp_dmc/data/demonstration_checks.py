@@ -36,7 +36,7 @@ def of_arrays(
 
 
 def of_frames(
-  frames: np.ndarray | None, episode: np.ndarray, shape: tuple[int, ...] | None
+  frames: np.ndarray | None, episode: Any, shape: tuple[int, ...] | None
 ) -> list[str]:
   """Faults of the frames of checked arrays.
 

@@ -234,7 +234,9 @@ def _faults(
   arrays, frames, observation_size=None, action_size=None, shape=None
 ):
   faults = checks.of_arrays(arrays, observation_size, action_size)
-  return faults or checks.of_frames(frames, arrays["episode"], shape)
+  if frames is None or not faults:
+    faults += checks.of_frames(frames, arrays.get("episode"), shape)
+  return faults
 
 
 def _write_frames(file: h5py.File, frames: np.ndarray) -> None:
@@ -253,9 +255,9 @@ def _write_frames(file: h5py.File, frames: np.ndarray) -> None:
 
 
 def _unpacked(stored: h5py.Dataset) -> np.ndarray:
-  """Frames in an unnamed file; as they are if they are none."""
+  """Frames in an unnamed file; what are none are not read."""
   if stored.ndim != 5 or stored.dtype != np.uint8:
-    return stored[:0]
+    return np.broadcast_to(np.zeros((), stored.dtype), stored.shape)
   unpacked = FrameFile(stored.shape[1:])
   for start in range(0, len(stored), _BLOCK):
     unpacked.append(stored[start : start + _BLOCK])

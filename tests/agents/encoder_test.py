@@ -11,7 +11,7 @@ from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder, EncoderConfig
 from tests import fixtures
 
-_SHAPE = (2, 20, 20, 3)
+_SHAPE = (2, 32, 32, 3)
 
 
 def _encoder(channels: int = 4) -> Encoder:
@@ -29,7 +29,7 @@ def _dots(places) -> np.ndarray:
 class EncoderTest(parameterized.TestCase):
   def test_features_are_bounded_and_follow_the_frames(self):
     encode = encoders.as_function(_encoder())
-    features = encode(_dots([(2, 2), (2, 12), (12, 2), (2, 2)]))
+    features = encode(_dots([(4, 4), (4, 24), (24, 4), (4, 4)]))
     self.assertEqual((features.shape, features.dtype), ((4, 6), np.float32))
     self.assertLessEqual(np.abs(features).max(), 1)
     np.testing.assert_array_equal(features[0], features[3])
@@ -48,8 +48,8 @@ class EncoderTest(parameterized.TestCase):
     torch.testing.assert_close(seen[:, 5:], features)
 
   def test_too_small_frames_are_refused(self):
-    with self.assertRaisesRegex(ValueError, "sides of 17 pixels or more"):
-      Encoder(5, (1, 16, 20, 3), 6, 4, torch.Generator())
+    with self.assertRaisesRegex(ValueError, "sides of 32 pixels or more"):
+      Encoder(5, (1, 31, 40, 3), 6, 4, torch.Generator())
 
   def test_shifts_move_every_frame_by_some_pixels_and_repeat_edges(self):
     frames = np.zeros((50, *_SHAPE), np.uint8)
@@ -77,12 +77,12 @@ class CloningTest(absltest.TestCase):
     """After some epochs on pairs whose action is where the dot is."""
     data = fixtures.demonstrations(40)
     random = np.random.default_rng(3)
-    places = random.integers(17, size=(41, 2))
+    places = random.integers(29, size=(41, 2))
     frames = np.zeros_like(_dots(places)) if is_blind else _dots(places)
     data = dataclasses.replace(
       data,
       observation=np.zeros_like(data.observation),
-      action=(places[:40] / 8.5 - 1).astype(np.float32),
+      action=(places[:40] / 14 - 1).astype(np.float32),
       frames=frames,
     )
     config = bc.BcConfig(

@@ -13,7 +13,7 @@ from lfgp_dmc.launch.command import UserError
 from tests import fixtures as shared
 from tests.launch import fixtures
 
-_SHAPE = (1, 20, 20, 3)
+_SHAPE = (1, 32, 32, 3)
 
 
 class PixelsTest(fixtures.RunTest):
@@ -35,7 +35,6 @@ class PixelsTest(fixtures.RunTest):
       demonstrations.write(self.seen / f"{task}.hdf5", data, attributes)
 
   def config(self, algorithm, **changes):
-    kinds = {}
     if algorithm in ("bc", "multitask_bc"):
       small = {
         "agent.encoder.channels": 4,
@@ -50,9 +49,8 @@ class PixelsTest(fixtures.RunTest):
       small = {"agent.networks.actor_trunk": "own", "env_steps": 100}
     return super().config(
       algorithm=algorithm,
-      demonstrations=str(self.seen),
       environment="tests.fixtures:SeenPoint",
-      **{**small, **kinds, **changes},
+      **{"demonstrations": str(self.seen), **small, **changes},
     )
 
   def test_collected_frames_are_those_of_the_environment(self):
@@ -71,9 +69,9 @@ class PixelsTest(fixtures.RunTest):
     self.assertEqual({row.task for row in rows}, set(toy.TASKS))
     observed = shared.SeenPoint(0).reset().observation
     flat = environments.flattener(shared.SeenPoint())(observed)
-    self.assertEqual(flat.shape, (1 + 20 * 20 * 3,))
+    self.assertEqual(flat.shape, (1 + 32 * 32 * 3,))
     self.assertEqual(lfgp_dmc.load_policy(run, "left")(flat).shape, (2,))
-    with self.assertRaisesRegex(ValueError, r"valid: \(1201,\)"):
+    with self.assertRaisesRegex(ValueError, r"valid: \(3073,\)"):
       lfgp_dmc.load_policy(run)(flat[:7])
 
   def test_acting_agents_see_the_features_of_a_clone(self):
