@@ -16,6 +16,7 @@ from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import command, datasets, policies
@@ -78,9 +79,11 @@ def _encoder_of(config: RunConfig, folder: pathlib.Path | None) -> Encoder:
       "whose encoder is used: train one by --preset=pixels "
       "--config.algorithm=multitask_bc (or bc, for dac)"
     )
-  is_stored = folder is not None and (folder / run_folder.ARRAYS_NAME).exists()
+  source: files.Path = config.init_from
+  if folder is not None and (folder / run_folder.ARRAYS_NAME).exists():
+    source = folder
   with command.checked_input():
-    encoder = Policy.load(folder if is_stored else config.init_from).encoder
+    encoder = Policy.load(source).encoder
   if encoder is None:
     raise UserError(f"config.init_from: {config.init_from} sees no pixels")
   return encoder

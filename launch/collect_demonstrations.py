@@ -7,6 +7,7 @@ import functools
 import os
 import pathlib
 import tempfile
+from typing import Any
 
 from absl import flags
 
@@ -118,7 +119,8 @@ def _plan() -> CollectionPlan:
       f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
       f"--task={_TASK.value}; it can do: {', '.join(spec.tasks)}"
     )
-  options, shape = {"control_hz": _HERTZ.value}, ()
+  options: dict[str, Any] = {"control_hz": _HERTZ.value}
+  shape: tuple[int, ...] = ()
   if _CAMERA.value:
     # A policy from pixels is to see no more; other experts need the state.
     seen = "vision" if spec.environment_spec.camera_size else "all"

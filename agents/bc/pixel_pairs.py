@@ -1,6 +1,7 @@
 """Expert pairs from pixels: frames stay on disk until a batch needs them."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import torch
@@ -33,7 +34,7 @@ class PixelPairs(SplitPairs):
     self._standardiser, self._encoder = standardiser, encoder
     self._shift, self._dtype = shift, dtype
     parts = [demonstrations[task] for task in tasks]
-    self._frames = [part.frames for part in parts]
+    self._frames: list[Any] = [part.frames for part in parts]
     self._places = [part.frame_rows() for part in parts]
     self._ends = np.cumsum([len(part) for part in parts])
     super().__init__(

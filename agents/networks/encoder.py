@@ -108,6 +108,8 @@ class Encoder(nn.Module):
 class _Conv(nn.Conv2d):
   """Computes in its inputs' dtype, like `linear.Linear`."""
 
+  bias: torch.Tensor
+
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
     dtype = inputs.dtype
     weight, bias = self.weight.to(dtype), self.bias.to(dtype)

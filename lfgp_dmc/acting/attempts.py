@@ -206,16 +206,14 @@ class Collector:
 
   def _stacked(self, task: str, steps: Sequence[Transition]) -> Attempt:
     """The success; frames, of which neighbours share one, apart."""
-    rows = Transition(*(np.stack(part) for part in zip(*steps, strict=True)))
-    shape = self._plan.frame_shape
+    observed, actions, after = zip(*steps, strict=True)
+    action, shape = np.stack(actions), self._plan.frame_shape
     if not shape:
-      return Attempt(task, rows)
-    floats = rows.observation.shape[1] - math.prod(shape)
-    last = rows.next_observation[-1:]
-    pixels = np.concatenate([rows.observation, last])[:, floats:]
-    rows = Transition(
-      rows.observation[:, :floats],
-      rows.action,
-      rows.next_observation[:, :floats],
-    )
-    return Attempt(task, rows, pixels.astype(np.uint8).reshape(-1, *shape))
+      return Attempt(
+        task, Transition(np.stack(observed), action, np.stack(after))
+      )
+    states = np.stack([*observed, after[-1]])  # [T + 1, ...]
+    floats = states.shape[1] - math.prod(shape)
+    own = states[:, :floats].copy()  # no view: the pixels are to go
+    frames = states[:, floats:].astype(np.uint8).reshape(-1, *shape)
+    return Attempt(task, Transition(own[:-1], action, own[1:]), frames)

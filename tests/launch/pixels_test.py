@@ -5,7 +5,7 @@ import numpy as np
 import lfgp_dmc
 from lfgp_dmc import toy
 from lfgp_dmc.acting import collection, environments
-from lfgp_dmc.acting.attempts import CollectionPlan
+from lfgp_dmc.acting.attempts import CollectionPlan, Collector
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.data.replay import Replay
@@ -14,20 +14,20 @@ from tests import fixtures as shared
 from tests.launch import fixtures
 
 _SHAPE = (1, 32, 32, 3)
+_PLAN = CollectionPlan(
+  make_environment=lambda task: shared.SeenPoint(),
+  make_actor=toy.WalkingActor,
+  main_task="right",
+  tasks=toy.TASKS,
+  seed=0,
+  frame_shape=_SHAPE,
+)
 
 
 class PixelsTest(fixtures.RunTest):
   def setUp(self):
     super().setUp()
-    plan = CollectionPlan(
-      make_environment=lambda task: shared.SeenPoint(),
-      make_actor=toy.WalkingActor,
-      main_task="right",
-      tasks=toy.TASKS,
-      seed=0,
-      frame_shape=_SHAPE,
-    )
-    found = collection.collect(plan, "reset", toy.TASKS, 60, progress=False)
+    found = collection.collect(_PLAN, "reset", toy.TASKS, 60, progress=False)
     self.seen = self.folder / "seen"
     self.seen.mkdir()
     for task, (data, *_) in found.items():
@@ -60,6 +60,14 @@ class PixelsTest(fixtures.RunTest):
     after = (data.frames[rows + 1, 0].max((1, 3)) > 0).argmax(-1)
     self.assertTrue((after >= columns).all())  # the expert goes right
     self.assertGreater((after > columns).mean(), 0.9)
+
+  def test_attempts_keep_no_pixels_as_floats(self):
+    (attempt,) = Collector(_PLAN)(("right", [0]))[1]
+    kept = [
+      part.base if part.base is not None else part for part in attempt.rows
+    ]
+    self.assertLess(sum(part.nbytes for part in kept), 2000)
+    self.assertEqual(len(attempt.frames), len(attempt.rows.action) + 1)
 
   def test_clones_acts_and_resumes_to_the_same_numbers(self):
     config = self.config("multitask_bc")
