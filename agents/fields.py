@@ -16,6 +16,7 @@ _SAYS = "Input should be "  # how pydantic starts what is valid
 
 PositiveInt = Annotated[int, Field(strict=True, ge=1)]
 Count = Annotated[int, Field(strict=True, ge=0)]
+Processes = Annotated[Count, Field(le=4096)]  # or threads
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Real, Field(gt=0)]
 NonNegative = Annotated[Real, Field(ge=0)]

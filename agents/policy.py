@@ -1,7 +1,6 @@
 """A stored policy, and the one implementation of acting with intentions."""
 
 import dataclasses
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,8 +8,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import pydantic
-import safetensors
-import safetensors.numpy
 import torch
 from pydantic import Field
 
@@ -20,7 +17,7 @@ from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.agents.networks.trunk import Standardiser
-from lfgp_dmc.data import files
+from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
 
 
@@ -106,29 +103,26 @@ class Policy:
     """Reads a policy folder: `config.json` and `policy.safetensors`.
 
     Raises:
-      FileNotFoundError: a file is missing; the message names it.
-      ValueError: a file is damaged; the message names it and the fault.
+      ValueError: a file is missing or damaged; the message names it.
+      OSError: a file may not be read.
     """
     config_path = Path(folder) / CONFIG_NAME
     arrays_path = Path(folder) / ARRAYS_NAME
     for path in (config_path, arrays_path):
       if not path.is_file():
-        raise FileNotFoundError(f"no policy in {folder}: {path} is missing")
+        raise ValueError(f"no policy in {folder}: {path} is missing")
     try:
-      options = json.loads(config_path.read_text())[POLICY_FIELD]
-    except (OSError, ValueError, KeyError, TypeError) as error:
+      options = files.read_json(config_path)[POLICY_FIELD]
+    except (ValueError, KeyError, TypeError) as error:
       raise ValueError(
         f"{config_path}: no policy options under {POLICY_FIELD!r} ({error!r})"
       ) from error
     if not isinstance(options, dict):
       raise ValueError(f"{config_path}: {POLICY_FIELD!r} is not an object")
-    try:
-      arrays = safetensors.numpy.load_file(arrays_path)
-    except (OSError, safetensors.SafetensorError) as error:
-      raise ValueError(f"{arrays_path}: not readable ({error!r})") from error
+    arrays = array_files.read(arrays_path)
     try:
       return cls.from_arrays(arrays, options)
-    except ValueError as error:
+    except (ValueError, RuntimeError) as error:  # torch: too large
       raise ValueError(f"{arrays_path}: {error}") from error
 
   def save(
@@ -143,8 +137,7 @@ class Policy:
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    with files.replacing(folder / ARRAYS_NAME) as aside:
-      safetensors.numpy.save_file(self.arrays(), aside)
+    array_files.write(folder / ARRAYS_NAME, self.arrays())
     options = {**self.options(), "env_step": env_step}
     files.write_json(
       folder / CONFIG_NAME, {**(config or {}), POLICY_FIELD: options}

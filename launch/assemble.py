@@ -99,7 +99,6 @@ def _with_features(
     data,
     observation=np.hstack([data.observation, features[rows]]),
     next_observation=np.hstack([data.next_observation, features[rows + 1]]),
-    frames=None,
   )
 
 
@@ -125,13 +124,12 @@ def make_replay(
       parts.environment, parts.tasks, REWARD_PREFIX
     )
   # A full ring must still hold the rows of the last checkpoint.
-  is_ring = config.replay_capacity < config.env_steps or config.transfer_from
   slack = config.checkpoint_every + 2 * config.most_episode_steps
   return Replay(
     config.replay_capacity if folder else 1,
     *parts.widths,
     folder,
-    slack=slack if is_ring else 0,
+    slack=min(slack, config.env_steps) if folder else 0,
     reward_tasks=reward_tasks,
   )
 

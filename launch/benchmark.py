@@ -7,7 +7,6 @@ python launch/benchmark.py --what=memory --steps=20000
 python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
 
-import csv
 import functools
 import importlib
 import pathlib
@@ -16,7 +15,7 @@ from collections.abc import Iterator
 from absl import flags
 
 import lfgp_dmc
-from lfgp_dmc.data import files
+from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
 
@@ -60,24 +59,20 @@ def main() -> None:
   for task in _TASKS.value:
     command.check_choice("tasks", task, lfgp_dmc.ALL_TASKS)
   output = pathlib.Path(_OUTPUT.value) if _OUTPUT.value else None
-  if output and output.exists():
-    raise UserError(f"{output} exists; choose another --output")
+  if output:
+    if output.exists():
+      raise UserError(f"{output} exists; choose another --output")
+    files.check_writable(output)
   with command.checked_input():
     config = config_flags.resolved()
   rows = []
   for name, value in _measurements(config):
     text = f"{value:.0f}" if value == round(value) else f"{value:.4g}"
     print(f"{name}={text}", flush=True)
-    rows.append((name, text))
+    rows.append({"name": name, "value": text})
   if output:
     output.parent.mkdir(parents=True, exist_ok=True)
-    with (
-      files.replacing(output) as aside,
-      open(aside, "w", newline="", encoding="utf-8") as file,
-    ):
-      csv.writer(file, lineterminator="\n").writerows(
-        [("name", "value"), *rows]
-      )
+    csv_files.write(output, ("name", "value"), rows)
 
 
 def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:

@@ -3,10 +3,9 @@
 `python launch/collect_demonstrations.py --task=stack --output=data/stack`
 """
 
+import dataclasses
 import functools
-import os
 import pathlib
-import tempfile
 from typing import Any
 
 from absl import flags
@@ -14,8 +13,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc.acting import collection, environments
 from lfgp_dmc.acting.attempts import CollectionPlan
-from lfgp_dmc.data import demonstrations
-from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data import demonstrations, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
@@ -86,8 +84,21 @@ def main() -> int:
     )
   except collection.NoSuccessError as error:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
-  data = {task: part.demonstrations for task, part in found.items()}
-  _write(output, data)
+  attributes = {
+    "main_task": _TASK.value,
+    "collection": _COLLECTION.value,
+    "expert": _EXPERT.value,
+    "seed": _SEED.value,
+    "control_hz": _HERTZ.value,
+  }
+  data = {
+    task: dataclasses.replace(
+      part.demonstrations, attributes={"task": task, **attributes}
+    )
+    for task, part in found.items()
+  }
+  with command.checked_input():
+    demonstrations.write_folder(output, data)
   print(f"{demonstrations.summary_table(data)}\n")
   what = "attempts"
   if _LONGEST.value > 1:
@@ -159,32 +170,8 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
       f"--output={output} exists; valid: a new folder (datasets are never "
       "written into)"
     )
-  # Better now than after minutes of collecting.
-  output.parent.mkdir(parents=True, exist_ok=True)
-  if not os.access(output.parent, os.W_OK):
-    raise command.UserError(f"--output={output}: cannot write there")
+  files.check_writable(output)  # better now than after minutes of collecting
   return output, tasks
-
-
-def _write(output: pathlib.Path, data: dict[str, Demonstrations]) -> None:
-  """Writes the dataset aside, then gives it its name: whole or not at all."""
-  prefix = f".{output.name}.partial."
-  with tempfile.TemporaryDirectory(prefix=prefix, dir=output.parent) as aside:
-    folder = demonstrations.create_folder(pathlib.Path(aside) / output.name)
-    for task, pairs in data.items():
-      attributes = {
-        "task": task,
-        "main_task": _TASK.value,
-        "collection": _COLLECTION.value,
-        "expert": _EXPERT.value,
-        "seed": _SEED.value,
-        "control_hz": _HERTZ.value,
-      }
-      path = folder / (task + demonstrations.SUFFIX)
-      demonstrations.write(path, pairs, attributes)
-    if output.exists():
-      raise command.UserError(f"--output={output} appeared meanwhile")
-    os.rename(folder, output)
 
 
 cli = functools.partial(command.run, main)

@@ -6,8 +6,10 @@ before the flag `config` is defined with them.
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
+import ml_collections
 from absl import flags
 from ml_collections import config_flags
 
@@ -65,10 +67,19 @@ def resolved(
   return configs.from_dict(flag_values.config.to_dict())
 
 
-def is_given() -> bool:
-  """Whether a preset or any setting was given, in a flagfile or not."""
-  overrides = config_flags.get_override_values(flags.FLAGS["config"])
-  return bool(overrides) or flags.FLAGS["preset"].present > 0
+def resumed(stored: Mapping[str, Any]) -> configs.RunConfig:
+  """A run's config with the given settings over it.
+
+  Where they say which fields there are, they are all of it.
+  """
+  given = config_flags.get_override_values(flags.FLAGS["config"])
+  if flags.FLAGS["preset"].present or any(
+    name == "algorithm" or name.endswith(configs.KIND) for name in given
+  ):
+    return resolved()
+  config = ml_collections.ConfigDict(configs.from_dict(stored).to_dict())
+  config.update_from_flattened_dict(given)
+  return configs.from_dict(config.to_dict())
 
 
 def _name(argument: str) -> str:

@@ -10,12 +10,13 @@ takes all local ones under `ID/`; of others' datasets --attributes says what our
 files need: --attributes=task=stack,expert=human,...
 """
 
+import dataclasses
 import functools
 import pathlib
 
 from absl import flags
 
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import demonstrations, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 
@@ -42,26 +43,30 @@ def main() -> None:
   folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"
   with command.checked_input():
     if not _BACK.value:
-      paths = sorted(folder.glob(f"*{demonstrations.SUFFIX}"))
+      paths = files.own(folder, demonstrations.SUFFIX)
       if not paths:
         raise UserError(f"no dataset in {folder}")
-      for path in paths:
-        name = f"{prefix}{path.stem}-v0"
-        minari_datasets.to_minari(demonstrations.read(path), name)
-        print(name)
+      ours = {f"{prefix}{p.stem}-v0": demonstrations.read(p) for p in paths}
+      minari_datasets.to_minari(ours)
+      print("\n".join(ours))
       return
+    files.check_writable(folder / "a")
     names = [n for n in sorted(minari.list_local_datasets())
              if n.startswith(prefix)]  # fmt: skip
     if not names:
       raise UserError(f"no local Minari dataset starts with {prefix}")
-    found = [minari_datasets.from_minari(n, _attributes()) for n in names]
-    demonstrations.create_folder(folder)
-    for name, data in zip(names, found, strict=True):
+    found: dict[str, demonstrations.Demonstrations] = {}
+    for name in names:
+      data = minari_datasets.from_minari(name, _attributes())
       stem = name.removeprefix(prefix).rpartition("-v")[0]
       task = str(data.attributes.get("task", stem))
-      path = folder / (task + demonstrations.SUFFIX)
-      demonstrations.write(path, data, {"task": task, **data.attributes})
-      print(path)
+      if task in found:
+        raise UserError(f"{name} is a second dataset of {task}; keep one")
+      attributes = {"task": task, **data.attributes}
+      found[task] = dataclasses.replace(data, attributes=attributes)
+    demonstrations.write_folder(folder, found)
+    for task in found:
+      print(folder / (task + demonstrations.SUFFIX))
 
 
 def _attributes() -> dict[str, str | int]:

@@ -27,7 +27,6 @@ from lfgp_dmc.launch import command, config_flags, policies, training
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.study import figures, run_results
 from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
@@ -39,8 +38,8 @@ _STORED = flags.DEFINE_string(
   "A policy folder to show beside it; default: results/policies/TASK, if it is "
   "there.",
 )
-_HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.")
-_WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.")
+_HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.", 32, 4320)
+_WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.", 32, 7680)
 _POLICIES = pathlib.Path("results/policies")
 _CLIPS = 3  # intentions shown in the video
 _MOST_SECONDS = 8  # of each
@@ -59,12 +58,11 @@ def main() -> int:
   stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
   progress = training.train(config, path)
+  figure = training.draw(path)
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
     return command.INTERRUPTED
   columns = _columns(config, path, stored)
-  figure = path / "learning_curve.png"
-  figures.learning_curve(run_results.read_runs([path])[0], figure)
   clip = _film(config, path, columns, stored)
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
@@ -72,7 +70,7 @@ def main() -> int:
   print(f"run folder      {path}")
   print(f"demonstrations  {config.demonstrations}")
   print(f"success table   {path / 'success.txt'}")
-  print(f"learning curve  {figure}")
+  print(f"learning curve  {figure or 'none'}")
   print(f"video           {clip or graphics.fault()}")
   print(f"total time      {(time.monotonic() - start) / 60:.1f} minutes")
   return 0

@@ -54,6 +54,9 @@ class EnvironmentSpec:
 
   def check(self) -> None:
     """Raises ValueError if `build` would not find what it needs."""
+    for name in ("main_task", "environment"):
+      if not isinstance(value := getattr(self, name), str):
+        raise ValueError(f"config.{name} is {value!r}; valid: a text")
     if self.environment:
       _imported(self.environment)
     else:

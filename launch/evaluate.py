@@ -9,13 +9,12 @@ mean action; the reset of episode i depends on (--seed, i) alone.
 
 import functools
 import pathlib
-from collections.abc import Sequence
 
 from absl import flags
 
 import lfgp_dmc
 from lfgp_dmc.acting import evaluation
-from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.task_names import CONTROL_RATES
@@ -55,6 +54,8 @@ def main() -> None:
   """Plays, prints the table, and writes the rows."""
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   output = _output()
+  if output is not None:
+    _known(output)  # better refused now than after all episodes
   rows: list[evaluation_csv.EvaluationRow] = []
   for spec, tasks in _plan():
     rows += evaluation.evaluate(
@@ -69,7 +70,10 @@ def main() -> None:
     )
   print(evaluation_csv.success_table(rows))
   if output is not None:
-    add_rows(output, rows)
+    output.parent.mkdir(parents=True, exist_ok=True)
+    known = _known(output)
+    new = [row for row in rows if row[:4] not in known]
+    evaluation_csv.append_csv(output, new)
     print(f"\n{output}")
 
 
@@ -113,15 +117,12 @@ def _output() -> pathlib.Path | None:
   return path
 
 
-def add_rows(
-  path: pathlib.Path, rows: Sequence[evaluation_csv.EvaluationRow]
-) -> None:
-  """Appends the rows that the file, an evaluation if it exists, has not."""
-  path.parent.mkdir(parents=True, exist_ok=True)
+def _known(path: pathlib.Path) -> set[tuple]:
+  """Step, task, episode and seed of the rows of a file that can be written."""
+  files.check_writable(path)
   with command.checked_input():
-    known = evaluation_csv.read_csv(path) if path.exists() else []
-  keys = {row[:4] for row in known}  # env_step, task, episode, seed
-  evaluation_csv.append_csv(path, [row for row in rows if row[:4] not in keys])
+    rows = evaluation_csv.read_csv(path) if path.exists() else []
+  return {row[:4] for row in rows}
 
 
 cli = functools.partial(command.run, main)

@@ -24,6 +24,7 @@ from collections.abc import Sequence
 from absl import flags
 
 import lfgp_dmc
+from lfgp_dmc.data import files
 from lfgp_dmc.launch import clips, command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.pictures import film_strips, recorder, video
@@ -53,8 +54,8 @@ _OUTPUT = flags.DEFINE_string(
 _GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
 _SEED = flags.DEFINE_integer("seed", 0, "Of the (first) reset.", lower_bound=0)
 _CAMERA = flags.DEFINE_string("camera", "three_quarter", "The camera's name.")
-_HEIGHT = flags.DEFINE_integer("height", 480, "In pixels.", lower_bound=32)
-_WIDTH = flags.DEFINE_integer("width", 640, "In pixels.", lower_bound=32)
+_HEIGHT = flags.DEFINE_integer("height", 480, "In pixels.", 32, 4320)
+_WIDTH = flags.DEFINE_integer("width", 640, "In pixels.", 32, 7680)
 _SHADOWS = flags.DEFINE_bool(
   "shadows", True, "Shadows and smooth edges; without, 3 times as fast."
 )
@@ -196,8 +197,10 @@ def _output(
     raise UserError(
       f"--output={output}: unknown format; valid: {', '.join(formats)}"
     )
-  if output.exists():
-    raise UserError(f"{output} exists; choose another --output")
+  for path in (output, video.sidecar(output)):
+    if path.exists():
+      raise UserError(f"{path} exists; choose another --output")
+    files.check_writable(path)
   return output
 
 

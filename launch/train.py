@@ -5,7 +5,8 @@
   python launch/train.py --run=runs/stack_1 --resume
 
 The run's folder gets config.json, metrics.csv, evaluation.csv, TensorBoard
-events, checkpoints/, replay/ and policy.safetensors.
+events, checkpoints/, replay/ and policy.safetensors; in the end also
+learning_curve.png, which launch/plot.py --run draws at any time.
 """
 
 import functools
@@ -26,7 +27,8 @@ _RUN = flags.DEFINE_string(
 _RESUME = flags.DEFINE_bool(
   "resume",
   False,
-  "Continue --run from its last good checkpoint, with its own config.",
+  "Continue --run from its last good checkpoint, with its own config; flags "
+  "may name more steps, or where its demonstrations are now.",
 )
 
 
@@ -38,6 +40,7 @@ def main() -> int:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
   progress = training.train(config, path, _RESUME.value)
+  training.draw(path)
   return report(config, path, progress)
 
 
@@ -65,19 +68,18 @@ def report(
 
 
 def _config() -> configs.RunConfig:
-  """The config of the flags, or on a bare --resume the run's own."""
+  """The config of the flags, which --resume lays over the run's own."""
   with command.checked_input():
     if not _RESUME.value:
       return config_flags.resolved()
     if not _RUN.value:
       raise UserError("--resume needs --run: the folder to continue")
-    if config_flags.is_given():
-      return config_flags.resolved()
-    stored = run_folder.read_config(_RUN.value)
+    path = configs.fill(_RUN.value, flags.FLAGS.config.to_dict())
+    stored = run_folder.settings(run_folder.read_config(path))
     try:
-      return configs.from_dict(run_folder.settings(stored))
+      return config_flags.resumed(stored)
     except ValueError as error:
-      raise UserError(f"{_RUN.value}/config.json: {error}") from None
+      raise UserError(f"{path}/{run_folder.CONFIG_NAME}: {error}") from None
 
 
 cli = functools.partial(command.run, main, define_flags=config_flags.define)

@@ -1,19 +1,30 @@
 """Trains by a config, in a run's folder: new, or continued."""
 
+import dataclasses
+import hashlib
 import pathlib
 import shutil
 from typing import Any
 
+import numpy as np
+from absl import logging
+
 from lfgp_dmc.agents.lfgp import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
+from lfgp_dmc.data.demonstration_checks import FRAMES
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, command
+from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
+
+# What bad input raises while a run is made.
+_INPUT = (ValueError, OSError, MemoryError, OverflowError)
 
 
 def train(
@@ -31,6 +42,14 @@ def train(
     raise UserError(
       f"{path} exists; continue it with --resume, or choose another --run"
     )
+  sizes.check(config, path)
+  files.check_writable(path / run_folder.CONFIG_NAME)
+  sha256 = config.demonstrations_sha256
+  if resume:
+    with command.checked_input():
+      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
+      stored = run_folder.read_config(path)
+    sha256 = stored.get("demonstrations_sha256", "")  # none in older runs
   parts = assemble.make_parts(config, path if resume else None)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
@@ -38,20 +57,53 @@ def train(
       f"demonstrations: {config.demonstrations}, {len(found)} tasks, "
       f"{pairs} pairs"
     )
-  with command.checked_input():
-    if resume:
-      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
-    else:
+    config = dataclasses.replace(config, demonstrations_sha256=_sha256(found))
+    if sha256 not in ("", config.demonstrations_sha256):
+      raise UserError(
+        f"config.demonstrations is {config.demonstrations!r}; valid: the same "
+        f"data that the run was started with (SHA-256 {sha256})"
+      )
+  if not resume:
+    with command.checked_input():
       folder = run_folder.create(path, config.to_dict())
   try:
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
       _initialise(config, run.agent, run.replay)
-  except (ValueError, OSError) as error:
+  except BaseException as error:
     if not resume:  # it cannot start: as if it had not been tried
       shutil.rmtree(path)
-    raise UserError(str(error)) from error
+    if isinstance(error, _INPUT) or "allocate" in str(error):  # torch
+      raise UserError(str(error)) from error
+    raise
   return run.train()
+
+
+def _sha256(found: dict[str, Demonstrations]) -> str:
+  """Of all arrays, wherever they lie."""
+  digest = hashlib.sha256()
+  for task, data in found.items():
+    arrays = data.arrays()
+    if data.frames is not None:  # observations may be features by now
+      del arrays["observation"], arrays["next_observation"]
+      arrays[FRAMES] = data.frames
+    for name, array in arrays.items():
+      digest.update(f"{task} {name} {array.shape}".encode())
+      digest.update(np.ascontiguousarray(array).data)
+  return digest.hexdigest()
+
+
+def draw(path: pathlib.Path) -> pathlib.Path | None:
+  """Draws a run; where that fails it warns, since what was learned counts."""
+  try:
+    from lfgp_dmc.study import run_picture  # matplotlib takes its time
+
+    picture = path / run_picture.NAME
+    run_picture.draw(path, picture)
+    return picture
+  except Exception as error:
+    logging.warning("no picture of the run: %s", error)
+    return None
 
 
 def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:

@@ -10,6 +10,8 @@ Such rows show success but no way to it: they serve examples-only learning.
 """
 
 import pathlib
+import zipfile
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -28,7 +30,7 @@ _ARRAYS = ("observation", "action", "next_observation")
 
 def is_folder_of_examples(folder: files.Path) -> bool:
   """Whether a dataset folder holds such files."""
-  return any(pathlib.Path(folder).glob("*" + SUFFIX))
+  return bool(files.own(folder, SUFFIX))
 
 
 def read_folder(
@@ -46,7 +48,10 @@ def read_folder(
       found[task] = _read(path)
     except FileNotFoundError:
       faults.append(f"{path}: missing")
-    except (OSError, ValueError, KeyError) as error:
+    except (
+      OSError, ValueError, KeyError, TypeError, AttributeError, EOFError,
+      MemoryError, zipfile.BadZipFile, zlib.error,
+    ) as error:  # fmt: skip
       faults.append(f"{path}: {' '.join(str(error).split())}")
   if faults:
     raise DatasetError(

@@ -1,7 +1,10 @@
 """What many tests share: a folder of their own, demonstrations, a toy agent."""
 
+import contextlib
 import dataclasses
 import pathlib
+import resource
+from collections.abc import Iterator
 
 import numpy as np
 from absl.testing import parameterized
@@ -76,6 +79,17 @@ class SeenPoint(toy.PointEnvironment):
 
   def clear_success(self):
     self._done = dict.fromkeys(toy.TASKS, False)
+
+
+@contextlib.contextmanager
+def full_disk(size: int = 20_000) -> Iterator[None]:
+  """No file can grow beyond `size` bytes, whoever writes it."""
+  limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+  resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+  try:
+    yield
+  finally:
+    resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
 
 _RATES = ("wall_s", "steps_per_s", "updates_per_s")

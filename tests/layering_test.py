@@ -82,6 +82,7 @@ class LayeringTest(parameterized.TestCase):
       {"torch", *_SIMULATOR},
     ),
     ("lfgp_dmc.tasks.environment", {"torch"}),
+    ("lfgp_dmc.launch.train", {"matplotlib"}),  # it would slow the start
   )
   def test_importing_does_not_load(self, modules, heavy):
     code = (

@@ -89,7 +89,7 @@ def from_dict(values: Mapping[str, Any]) -> RunConfig:
     ValueError: an unknown field, or a value out of its range; a line each.
   """
   name = values.get("algorithm")
-  if name not in ALGORITHMS:
+  if not isinstance(name, str) or name not in ALGORITHMS:
     raise ValueError(
       f"config.algorithm is {name!r}; valid: {', '.join(ALGORITHMS)}"
     )

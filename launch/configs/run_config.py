@@ -10,6 +10,7 @@ from lfgp_dmc.agents.fields import (
   Count,
   Positive,
   PositiveInt,
+  Processes,
   Switch,
   Text,
   checked,
@@ -39,6 +40,7 @@ class RunConfig:
   pairs_per_task: Count = 0  # use the first so many of each file; 0: all
   mirror_demonstrations: Switch = False  # and as many mirror images of them
   collect_pairs: Count = 0  # collect so many a task if there is no folder
+  demonstrations_sha256: Text = ""  # of what was read; filled in by the run
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: Text = ""
@@ -69,12 +71,12 @@ class RunConfig:
   # Evaluation: every intention, mean action, the same resets for all runs.
   evaluation_episodes: PositiveInt = 50  # a task
   evaluation_seed: Count = 0
-  evaluation_workers: Count = 0  # processes; 0: one a core
+  evaluation_workers: Processes = 0  # processes; 0: one a core
 
   # Resources.
   replay_capacity: PositiveInt = 4_000_000  # transitions
   device: Text = "auto"  # cpu, cuda, ...; auto: cuda where there is one
-  threads: Count = 1  # of torch; 0: one a core that this process may use
+  threads: Processes = 1  # of torch; 0: one a core that this process may use
   bfloat16: Switch = False  # products in bfloat16; parameters stay float32
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
   deterministic: Switch = False  # the same numbers again, after a resume too

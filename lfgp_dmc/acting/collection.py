@@ -20,7 +20,7 @@ from lfgp_dmc.acting import workers as work
 from lfgp_dmc.acting.attempts import Attempt, CollectionPlan, Collector, Job
 from lfgp_dmc.data.demonstration_checks import COLLECTIONS
 from lfgp_dmc.data.demonstrations import Demonstrations
-from lfgp_dmc.data.frames import FrameFile
+from lfgp_dmc.data.frame_files import FrameFile
 from lfgp_dmc.types import Transition
 
 _CHUNK = 8  # reset-based attempts a job

@@ -12,14 +12,20 @@ STEP_COLUMN = "env_step"
 
 
 def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
-  """Reads columns and rows, as text; a torn last line is left out."""
-  with open(path, newline="", encoding="utf-8") as file:
-    text = file.read()
-  # A process that is killed while writing leaves a torn last line.
-  whole = text[: text.rfind("\n") + 1]
-  reader = csv.DictReader(whole.splitlines())
-  columns = list(reader.fieldnames or ())
-  return columns, [row for row in reader if None not in row.values()]
+  """Reads columns and rows, as text; a torn last line is left out.
+
+  Raises:
+    ValueError: it is no CSV; the message names it.
+  """
+  try:
+    text = pathlib.Path(path).read_bytes().decode()
+    # A process that is killed while writing leaves a torn last line.
+    whole = text[: text.rfind("\n") + 1]
+    reader = csv.DictReader(whole.splitlines())
+    columns = list(reader.fieldnames or ())
+    return columns, [row for row in reader if None not in row.values()]
+  except (UnicodeDecodeError, csv.Error) as error:
+    raise ValueError(f"{path} is no CSV: {error}") from None
 
 
 def write(
@@ -47,7 +53,10 @@ def append(
   if not path.exists() or not path.stat().st_size:
     write(path, columns, rows)
     return
-  with open(path, "r+", newline="", encoding="utf-8") as file:
+  with (
+    files.naming(path),
+    open(path, "r+", newline="", encoding="utf-8") as file,
+  ):
     found = next(csv.reader(file))
     if found != list(columns):
       raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
@@ -56,7 +65,11 @@ def append(
 
 
 def truncate_after(path: files.Path, env_step: int) -> None:
-  """Drops the rows later than `env_step`; nothing if there is no file."""
+  """Drops the rows later than `env_step`; nothing if there is no file.
+
+  Raises:
+    ValueError: the rows have no such number; the message names the file.
+  """
   path = pathlib.Path(path)
   if not path.exists():
     return
@@ -64,5 +77,8 @@ def truncate_after(path: files.Path, env_step: int) -> None:
   if not columns:
     path.unlink()
     return
-  kept = [row for row in rows if int(row[STEP_COLUMN]) <= env_step]
+  try:
+    kept = [row for row in rows if int(row[STEP_COLUMN]) <= env_step]
+  except (KeyError, ValueError) as error:
+    raise ValueError(f"{path} is damaged: {error!r}") from None
   write(path, columns, kept)

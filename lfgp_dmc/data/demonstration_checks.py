@@ -66,6 +66,11 @@ def of_frames(
 def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
   """Faults of the attributes; `task` is the expected one (None: any)."""
   faults = [f"missing attribute {k!r}" for k in _VALID if k not in attributes]
+  faults += [
+    f"{name} is a {type(value).__name__}; valid: a text or a number"
+    for name, value in attributes.items()
+    if name in _VALID and not isinstance(value, str | int | float | np.number)
+  ]
   if faults:
     return faults
   if task is not None and attributes["task"] != task:

@@ -14,8 +14,10 @@ into an unnamed file, where any row is at hand without being in memory.
 """
 
 import dataclasses
+import io
 import os
 import pathlib
+import tempfile
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,10 +25,8 @@ import h5py
 import numpy as np
 
 from lfgp_dmc.data import demonstration_checks as checks
-from lfgp_dmc.data import files
-from lfgp_dmc.data.frames import FrameFile
+from lfgp_dmc.data import files, frame_files
 
-_BLOCK = 16  # frames that are compressed together
 SUFFIX = ".hdf5"
 
 
@@ -68,21 +68,29 @@ class Demonstrations:
     return np.arange(len(self)) + np.cumsum(begins)
 
 
-def create_folder(path: files.Path) -> pathlib.Path:
-  """Makes a new dataset folder; an existing one is never written into.
+def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
+  """Writes a new dataset folder, a file a task: all of them or nothing.
 
   Raises:
+    DatasetError: as of `write`, or a task's name is no file name.
     FileExistsError: something is already there.
   """
-  folder = pathlib.Path(path)
-  try:
-    folder.mkdir(parents=True)
-  except FileExistsError:
-    raise FileExistsError(
-      f"{folder} exists; datasets are never written into: choose another "
-      "--output or move it away"
-    ) from None
-  return folder
+  final = pathlib.Path(path)
+  final.parent.mkdir(parents=True, exist_ok=True)
+  prefix = f".{final.name}.partial."
+  with tempfile.TemporaryDirectory(prefix=prefix, dir=final.parent) as aside:
+    folder = pathlib.Path(aside) / final.name
+    folder.mkdir()
+    for task, data in found.items():
+      if pathlib.Path(task).name != task:
+        raise DatasetError(f"task is {task!r}; valid: a file's name")
+      write(folder / (task + SUFFIX), data)
+    if final.exists():
+      raise FileExistsError(
+        f"{final} exists; datasets are never written into: choose another "
+        "folder or move it away"
+      )
+    os.rename(folder, final)
 
 
 def write(
@@ -115,13 +123,15 @@ def write(
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
-  with files.replacing(path) as aside, h5py.File(aside, "w") as file:
+  content = io.BytesIO()  # HDF5 has no OSError for a full disk
+  with h5py.File(content, "w") as file:
     for name, array in arrays.items():
       file.create_dataset(name, data=array)
     if demonstrations.frames is not None:
-      _write_frames(file, demonstrations.frames)
+      frame_files.pack(file, checks.FRAMES, demonstrations.frames)
     for name, value in attributes.items():
       file.attrs[name] = value
+  files.write_bytes(path, content.getvalue())
 
 
 def read(
@@ -143,7 +153,10 @@ def read(
   try:
     arrays, attributes = _read_all(path)
     frames = arrays.pop(checks.FRAMES, None)
-  except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+  except (
+    OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
+    OverflowError, AttributeError,
+  ) as error:  # fmt: skip
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
@@ -214,15 +227,19 @@ def summary_table(demonstrations: Mapping[str, Demonstrations]) -> str:
   return "\n".join(rows)
 
 
-def _read_all(path: os.PathLike[str]) -> tuple[dict[str, np.ndarray], dict]:
+def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
   """Every top-level dataset and every attribute, as NumPy and Python values."""
   arrays = {}
   with h5py.File(path, "r") as file:
     for name in checks.DTYPES:
       if name in file and isinstance(file[name], h5py.Dataset):
-        arrays[name] = file[name][()]
+        size = file[name].nbytes
+        # Compression packs a thousandfold at most.
+        if size > 1000 * path.stat().st_size + (1 << 20):
+          raise ValueError(f"{name!r} declares {size:,} bytes")
+        arrays[name] = np.asarray(file[name][()])
     if isinstance(frames := file.get(checks.FRAMES), h5py.Dataset):
-      arrays[checks.FRAMES] = _unpacked(frames)
+      arrays[checks.FRAMES] = frame_files.unpack(frames)
     attributes = {
       name: value.item() if isinstance(value, np.generic) else value
       for name, value in file.attrs.items()
@@ -237,28 +254,3 @@ def _faults(
   if frames is None or not faults:
     faults += checks.of_frames(frames, arrays.get("episode"), shape)
   return faults
-
-
-def _write_frames(file: h5py.File, frames: np.ndarray) -> None:
-  """Block by block, with a checksum on each."""
-  stored = file.create_dataset(
-    checks.FRAMES,
-    frames.shape,
-    np.uint8,
-    chunks=(min(_BLOCK, len(frames)), *frames.shape[1:]),
-    compression="gzip",
-    compression_opts=1,
-    fletcher32=True,
-  )
-  for start in range(0, len(frames), _BLOCK):
-    stored[start : start + _BLOCK] = frames[start : start + _BLOCK]
-
-
-def _unpacked(stored: h5py.Dataset) -> np.ndarray:
-  """Frames in an unnamed file; what are none are not read."""
-  if stored.ndim != 5 or stored.dtype != np.uint8:
-    return np.broadcast_to(np.zeros((), stored.dtype), stored.shape)
-  unpacked = FrameFile(stored.shape[1:])
-  for start in range(0, len(stored), _BLOCK):
-    unpacked.append(stored[start : start + _BLOCK])
-  return unpacked.mapped()

@@ -1,9 +1,11 @@
 """Files that are whole or absent: write aside, flush to disk, then rename."""
 
 import contextlib
+import errno
 import json
 import os
 import pathlib
+import tempfile
 from collections.abc import Iterator
 from typing import Any
 
@@ -21,12 +23,50 @@ def replacing(path: Path) -> Iterator[pathlib.Path]:
   final = pathlib.Path(path)
   aside = final.with_name(f".{final.stem}.{os.getpid()}.partial{final.suffix}")
   try:
-    yield aside
-    flush_to_disk(aside)
-    os.replace(aside, final)
-    flush_to_disk(final.parent)
+    with naming(final):
+      yield aside
+      flush_to_disk(aside)
+      os.replace(aside, final)
+      flush_to_disk(final.parent)
   finally:
     aside.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def naming(path: Path) -> Iterator[None]:
+  """Lets an OSError name this path; a full disk's names none."""
+  try:
+    yield
+  except OSError as error:
+    if error.errno is not None:
+      error.filename = os.fspath(path)
+    raise
+
+
+def check_writable(path: Path) -> None:
+  """Raises OSError if a file cannot be written there; makes and alters none.
+
+  Its folder need not exist yet.
+  """
+  path = pathlib.Path(path).absolute()
+  try:
+    if path.exists():
+      open(path, "r+b").close()
+    tempfile.TemporaryFile(dir=existing_parent(path)).close()
+  except OSError as error:
+    raise OSError(error.errno, error.strerror, os.fspath(path)) from None
+
+
+def existing_parent(path: Path) -> pathlib.Path:
+  """The innermost folder above `path` that exists."""
+  parents = pathlib.Path(path).absolute().parents
+  return next(parent for parent in parents if parent.exists())
+
+
+def own(folder: Path, suffix: str) -> list[pathlib.Path]:
+  """The files of a suffix, sorted; none that other systems or kills left."""
+  found = sorted(pathlib.Path(folder).glob(f"*{suffix}"))
+  return [path for path in found if path.name[0] != "."]
 
 
 def flush_to_disk(path: Path) -> None:
@@ -38,11 +78,25 @@ def flush_to_disk(path: Path) -> None:
     os.close(descriptor)
 
 
+def write_bytes(path: Path, content: bytes) -> None:
+  """Writes a file, whole or not at all.
+
+  Raises:
+    OSError: it cannot be written; for lack of room, the message has its size.
+  """
+  try:
+    with replacing(path) as aside:
+      aside.write_bytes(content)
+  except OSError as error:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+      size = f"it needs {len(content) / 1e6:.3g} MB"
+      error.strerror = f"{error.strerror}; {size}"
+    raise
+
+
 def write_json(path: Path, value: Any) -> None:
   """Writes a JSON file, whole or not at all."""
-  text = json.dumps(value, indent=2) + "\n"
-  with replacing(path) as aside:
-    aside.write_text(text, encoding="utf-8")
+  write_bytes(path, (json.dumps(value, indent=2) + "\n").encode())
 
 
 def read_json(path: Path) -> Any:

@@ -5,6 +5,8 @@ import pathlib
 
 import numpy as np
 
+from lfgp_dmc.data import files
+
 _CHUNK = 16_384  # rows of disk taken at a time
 
 
@@ -26,7 +28,9 @@ def open_rows(
   except ValueError as error:
     raise ValueError(f"{path} is damaged: {error}") from None
   size, width = shape
-  valid = (size, mapped.shape[-1] if width is None else width)
+  if width is None and mapped.ndim == 2:
+    width = mapped.shape[1]
+  valid = (size, width)
   if mapped.shape != valid or mapped.dtype != np.float32:
     raise ValueError(
       f"{path} is {mapped.dtype} {list(mapped.shape)}; expected float32 "
@@ -43,7 +47,8 @@ def reserve(mapped: np.memmap, start: int) -> int:
   """
   stop = min(start + _CHUNK, len(mapped))
   width = mapped.strides[0]
-  with open(str(mapped.filename), "r+b") as file:
+  name = str(mapped.filename)
+  with files.naming(name), open(name, "r+b") as file:
     os.posix_fallocate(
       file.fileno(), mapped.offset + start * width, (stop - start) * width
     )

@@ -7,6 +7,8 @@ local dataset of flat float observations can be read (`MINARI_DATASETS_PATH`).
 """
 
 import json
+import pathlib
+import shutil
 from collections.abc import Mapping
 from typing import Any
 
@@ -14,31 +16,64 @@ import gymnasium
 import minari
 import numpy as np
 from minari.data_collector import EpisodeBuffer
+from minari.dataset.minari_dataset import parse_dataset_id
+from minari.namespace import validate_namespace
+from minari.storage import get_dataset_path
 
 from lfgp_dmc.data.demonstrations import Demonstrations
 
 _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
 
 
-def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
-  """Stores one task's demonstrations as a local Minari dataset.
+def to_minari(found: Mapping[str, Demonstrations]) -> None:
+  """Stores demonstrations as local Minari datasets: all of them or nothing.
 
-  The id is Minari's name, such as "lfgp_dmc/stack_reset/reach-v0".
+  The keys are Minari's names, such as "lfgp_dmc/stack_reset/reach-v0".
 
   Raises:
-    ValueError: the id is taken or no id, or an episode's rows do not follow
-      from one another.
+    ValueError: a name is taken or no name of Minari, or an episode's rows do
+      not follow from one another; the message names the dataset.
   """
-  if dataset_id in minari.list_local_datasets():
-    raise ValueError(f"the Minari dataset {dataset_id} exists; choose another")
+  for dataset_id, data in found.items():
+    _check(data, dataset_id)
+  made: list[pathlib.Path] = []
+  try:
+    for dataset_id, data in found.items():
+      path = get_dataset_path(dataset_id)
+      made += [new for new in (path, *path.parents) if not new.exists()]
+      _create(data, dataset_id)
+  except BaseException:
+    for folder in made:
+      shutil.rmtree(folder, ignore_errors=True)
+    raise
+
+
+def _check(data: Demonstrations, dataset_id: str) -> None:
+  """Raises ValueError if Minari could not store or list the dataset."""
+  try:
+    namespace, *_ = parse_dataset_id(dataset_id)
+    if namespace is not None:
+      validate_namespace(namespace)
+  except (TypeError, ValueError):  # the first without a version
+    raise ValueError(
+      f"{dataset_id!r} is no name of Minari; valid: NAMESPACE/NAME-v0 of "
+      "letters, digits, - and _"
+    ) from None
+  path = get_dataset_path(dataset_id)
+  for place in (path, *(p for p in path.parents if (p / "data").exists())):
+    if place.exists():
+      raise ValueError(f"the Minari dataset {place} exists; choose another")
   gaps = (data.episode[1:] == data.episode[:-1]) & np.any(
     data.observation[1:] != data.next_observation[:-1], axis=1
   )
   if gaps.any():
     raise ValueError(
-      f"row {int(np.argmax(gaps)) + 1} does not start where the row before "
-      "ended; Minari keeps whole trajectories"
+      f"{dataset_id}: row {int(np.argmax(gaps)) + 1} does not start where the "
+      "row before ended; Minari keeps whole trajectories"
     )
+
+
+def _create(data: Demonstrations, dataset_id: str) -> None:
   dataset = minari.create_dataset_from_buffers(
     dataset_id,
     [_buffer(data, rows) for rows in _episodes(data)],
@@ -48,7 +83,6 @@ def to_minari(data: Demonstrations, dataset_id: str) -> minari.MinariDataset:
     description="Demonstrations of LfGP-DMC.",
   )
   dataset.storage.update_metadata({_KEY: json.dumps(dict(data.attributes))})
-  return dataset
 
 
 def from_minari(

@@ -37,12 +37,15 @@ class Replay(Ring):
       folder: where the arrays are mapped; None keeps them in memory.
       reward_tasks: whose dense rewards are kept beside each row.
       slack: rows kept intact beyond the capacity; at least the rows added
-        between two checkpoints where a full ring must resume exactly.
+        between two checkpoints where a full ring must resume exactly. An
+        existing folder keeps its own.
       read_only: whether the folder's files are never written to.
 
     Raises:
       ValueError: the folder holds a replay of other sizes, or is damaged.
     """
+    if folder is not None and (pathlib.Path(folder) / SIDECAR).exists():
+      slack = max(0, _read_sidecar(pathlib.Path(folder))["size"] - capacity)
     super().__init__(capacity, slack)
     self.reward_tasks = tuple(reward_tasks)  # the columns of the rewards
     self.widths = (observation_size, action_size)
@@ -236,5 +239,5 @@ def _read_sidecar(folder: pathlib.Path) -> dict[str, Any]:
       **{name: int(found[name]) for name in counts},
       "reward_tasks": list(found.get("reward_tasks", ())),
     }
-  except (AttributeError, KeyError, TypeError, ValueError):
+  except (AttributeError, KeyError, TypeError, ValueError, OverflowError):
     raise ValueError(f"{path} is damaged: {found!r}") from None

@@ -1,5 +1,6 @@
 """Clips, pictures and film strips of frames, each with a JSON sidecar."""
 
+import io
 import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -19,7 +20,7 @@ def write(
   fps: float = 20.0,
   metadata: Mapping[str, Any] | None = None,
 ) -> pathlib.Path:
-  """Writes frames and, beside them, `NAME.json`; returns the path.
+  """Writes frames and, beside them, `sidecar(path)`; returns the path.
 
   Args:
     path: `.mp4`, `.gif`, `.webp`, or `.png` (a film strip, side by side).
@@ -37,20 +38,31 @@ def write(
   frames = _checked(frames)
   height, width, _ = frames[0].shape
   path.parent.mkdir(parents=True, exist_ok=True)
-  with files.replacing(path) as aside:
-    if suffix == ".png":
-      imageio.imwrite(aside, np.concatenate(frames, axis=1))
-    elif suffix in (".gif", ".webp"):
-      imageio.mimwrite(aside, frames, duration=1000 / fps, loop=0)
-    else:
+  if suffix == ".mp4":
+    with files.replacing(path) as aside:
       # yuv420p halves the colours' resolution: sides must be even.
       odd = ((0, height % 2), (0, width % 2), (0, 0))
       even: list[Any] = [np.pad(frame, odd, mode="edge") for frame in frames]
       imageio.mimwrite(aside, even, fps=fps, quality=8, macro_block_size=2)
+      _check_whole(aside, path)
+  else:  # imageio does not tell of a full disk
+    picture = io.BytesIO()
+    if suffix == ".png":
+      imageio.imwrite(picture, np.concatenate(frames, axis=1), format="png")
+    else:
+      kind, each = suffix.removeprefix("."), 1000 / fps
+      imageio.mimwrite(picture, frames, format=kind, duration=each, loop=0)
+    files.write_bytes(path, picture.getvalue())
   size = {"frames": len(frames), "fps": fps, "width": width, "height": height}
   facts = {"file": path.name, **size, **(metadata or {})}
-  files.write_json(path.with_suffix(".json"), facts)
+  files.write_json(sidecar(path), facts)
   return path
+
+
+def sidecar(path: files.Path) -> pathlib.Path:
+  """`clip.mp4.json` of `clip.mp4`: the name of no other file."""
+  path = pathlib.Path(path)
+  return path.with_name(f"{path.name}.json")
 
 
 def film_strip(frames: Sequence[np.ndarray], count: int) -> list[np.ndarray]:
@@ -111,6 +123,14 @@ def inset(frame: np.ndarray, views: Sequence[np.ndarray]) -> np.ndarray:
     )
     frame[-side:, i * side : (i + 1) * side] = np.asarray(square)
   return frame
+
+
+def _check_whole(aside: pathlib.Path, final: pathlib.Path) -> None:
+  """Raises OSError if a clip ends early: FFmpeg hides a full disk."""
+  try:
+    imageio.get_reader(aside).close()
+  except (OSError, RuntimeError, IndexError):
+    raise OSError(f"{final} is not whole: is the disk full?") from None
 
 
 def _checked(frames: Sequence[np.ndarray]) -> list[Any]:

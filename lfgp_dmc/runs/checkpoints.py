@@ -6,18 +6,14 @@ flushed to disk and then renamed, so that a kill leaves no half of one.
 """
 
 import hashlib
-import json
 import pathlib
 import shutil
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-import safetensors
-import safetensors.numpy
 from absl import logging
 
-from lfgp_dmc.data import files
+from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs import pytree
 
 KEPT_LATEST = 3
@@ -48,7 +44,8 @@ def save(
     run_steps: length of the whole run; None keeps the last three only.
 
   Raises:
-    OSError: it could not be written; the earlier checkpoints are untouched.
+    OSError: it could not be written (the message names the file and its
+      size); the earlier checkpoints are untouched.
     TypeError: a value that cannot be stored.
   """
   folder = pathlib.Path(folder)
@@ -75,13 +72,14 @@ def load(path: files.Path) -> dict[str, Any]:
 
   Raises:
     CheckpointError: a file of it is missing, truncated or altered.
+    PermissionError: a file of it may not be read.
   """
   path = pathlib.Path(path)
   _verify(path)
   try:
-    arrays = safetensors.numpy.load_file(path / _ARRAYS)
+    arrays = array_files.read(path / _ARRAYS)
     return pytree.unpack(arrays, files.read_json(path / _STATE))
-  except (ValueError, KeyError, safetensors.SafetensorError) as error:
+  except (ValueError, KeyError) as error:
     raise CheckpointError(f"{path}: {error}") from None
 
 
@@ -102,21 +100,16 @@ def every(folder: files.Path) -> list[pathlib.Path]:
   folder = pathlib.Path(folder)
   if not folder.is_dir():
     return []
-  found = [path for path in folder.iterdir() if path.name.isdigit()]
+  found = [path for path in folder.iterdir() if path.name.isdecimal()]
   return sorted(found, key=lambda path: int(path.name))
 
 
 def _write(aside: pathlib.Path, state: Mapping[str, Any]) -> None:
   arrays, tree = pytree.pack(state)
-  # safetensors writes the memory as it lies: it must lie in C order.
-  ordered = {name: np.asarray(a, order="C") for name, a in arrays.items()}
-  safetensors.numpy.save_file(ordered, aside / _ARRAYS)
-  (aside / _STATE).write_text(json.dumps(tree), encoding="utf-8")
+  array_files.write(aside / _ARRAYS, arrays)
+  files.write_json(aside / _STATE, tree)
   manifest = {name: _fingerprint(aside / name) for name in (_ARRAYS, _STATE)}
-  (aside / _MANIFEST).write_text(json.dumps(manifest), encoding="utf-8")
-  for name in (_ARRAYS, _STATE, _MANIFEST):
-    files.flush_to_disk(aside / name)
-  files.flush_to_disk(aside)
+  files.write_json(aside / _MANIFEST, manifest)
 
 
 def _fingerprint(path: pathlib.Path) -> dict[str, Any]:
@@ -135,6 +128,8 @@ def _verify(path: pathlib.Path) -> None:
           f"{path / name} has {found['bytes']} bytes that are not the "
           f"{written['bytes']} that were written"
         )
+  except PermissionError:  # it may be as good as any
+    raise
   except (OSError, KeyError, TypeError, ValueError) as error:
     raise CheckpointError(f"{path}: {error}") from None
 

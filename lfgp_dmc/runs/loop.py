@@ -6,6 +6,7 @@ replay and neither the scheduler nor the episode count sees it.
 """
 
 import itertools
+import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -60,7 +61,7 @@ class EpisodeRounds(Rounds[ActingAgent]):
     progress, schedule = self.progress, self._schedule
     episode: list[Step] = []
     rewards: list[np.ndarray] = []
-    left = schedule.env_steps - progress.env_step
+    left = min(schedule.env_steps - progress.env_step, sys.maxsize)
     for step in itertools.islice(self._steps(), left):
       progress.env_step += 1
       failed = environments.is_physics_failure(step.timestep)

@@ -50,10 +50,11 @@ class MetricsLog:
         if name != csv_files.STEP_COLUMN
       ]
     )
-    self._events.add_event(
-      event_pb2.Event(wall_time=time.time(), step=env_step, summary=summary)
-    )
-    self._events.flush()
+    with files.naming(self._path.parent / "tensorboard"):
+      self._events.add_event(
+        event_pb2.Event(wall_time=time.time(), step=env_step, summary=summary)
+      )
+      self._events.flush()
 
   def truncate_after(self, env_step: int) -> None:
     """Drops rows and events after `env_step`, where a resumed run goes on."""

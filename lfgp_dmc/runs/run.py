@@ -101,6 +101,10 @@ class Run:
       state = checkpoints.load(path)
       self.agent.load_state_dict(state["agent"])
       self._progress = Progress(**state["progress"])
+      # Its end may be later than it was.
+      self._progress.is_complete = (
+        isinstance(self.agent, SupervisedAgent) and self.agent.has_converged
+      )
       replay_total, last_step = state["replay_total"], self._progress.env_step
       logging.info("resuming from %s", path)
     if self.replay is not None:

@@ -8,6 +8,7 @@ import datetime
 import fcntl
 import json
 import pathlib
+import shutil
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,6 +20,8 @@ ARRAYS_NAME = "policy.safetensors"
 # Added to the config by the run: the options of the policy's arrays, so that
 # its folder is a policy folder too.
 POLICY_FIELD = "policy"
+# When a run is resumed: neither changes a number, if the data are the same.
+_MAY_CHANGE = ("demonstrations", "demonstrations_sha256", "evaluation_workers")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -74,8 +77,12 @@ def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
     raise ValueError(
       f"{path} exists; continue it with --resume, or choose another --run"
     ) from None
-  run = RunFolder(path, _locked(path))
-  files.write_json(path / CONFIG_NAME, config)
+  try:
+    run = RunFolder(path, _locked(path))
+    files.write_json(path / CONFIG_NAME, config)
+  except BaseException:
+    shutil.rmtree(path)
+    raise
   return run
 
 
@@ -88,7 +95,8 @@ def resume(
 
   Args:
     path: of the run.
-    config: of the command; it must equal the run's own.
+    config: of the command; it must equal the run's own, except for more
+      steps, another number of workers, and demonstrations elsewhere.
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
@@ -126,7 +134,9 @@ def read_config(path: files.Path) -> dict[str, Any]:
     config = files.read_json(path / CONFIG_NAME)
   except ValueError as error:
     raise ValueError(str(error)) from None
-  if not isinstance(config, dict):
+  if not isinstance(config, dict) or not isinstance(
+    config.get(POLICY_FIELD, {}), dict
+  ):
     raise ValueError(f"{path / CONFIG_NAME} holds no config")
   return config
 
@@ -134,7 +144,7 @@ def read_config(path: files.Path) -> dict[str, Any]:
 def _differing_fields(
   known: Mapping[str, Any], given: Mapping[str, Any]
 ) -> list[str]:
-  """What differs between two configs: `agent.xi (45, now 90)`, ..."""
+  """What differs and may not: `agent.xi (45, now 90)`, ..."""
   # As JSON, so that tuples equal lists.
   first, second = (
     {name: json.dumps(value) for name, value in pytree.flattened(config)}
@@ -145,6 +155,8 @@ def _differing_fields(
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names
     if first.get(name) != second.get(name)
+    and name not in _MAY_CHANGE
+    and not (name == "env_steps" and given[name] > known[name])
   ]
 
 
@@ -152,7 +164,8 @@ def _locked(path: pathlib.Path):
   """An open file whose lock the system releases however the process ends."""
   file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
   try:
-    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    with files.naming(file.name):  # some file systems have no locks
+      fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
   except BlockingIOError:
     file.close()
     raise ValueError(

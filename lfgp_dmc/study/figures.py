@@ -1,11 +1,9 @@
 """Learning curves of runs, and the paper's figures of results."""
 
 import itertools
-import pathlib
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
-
-import matplotlib.figure
 
 from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.study import drawing, run_results, statistics
@@ -13,28 +11,23 @@ from lfgp_dmc.study.drawing import Cell, Lines, Style
 from lfgp_dmc.study.run_results import Run
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
 
-# Okabe and Ito's palette, for colour-blind readers too.
-_COLOURS = _BLUE, _ORANGE, _GREEN, _PINK, _YELLOW, _SKY, _BLACK = (
-  "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000",
-)  # fmt: skip
-_MARKERS = "osD^vP*"
 _MULTITASK = {
-  "lfgp": Style("LfGP", _BLUE),
-  "multitask_bc": Style("Multitask BC", _GREEN),
-  "lfgp_ns": Style("LfGP-NS", _ORANGE),
+  "lfgp": Style("LfGP", drawing.BLUE),
+  "multitask_bc": Style("Multitask BC", drawing.GREEN),
+  "lfgp_ns": Style("LfGP-NS", drawing.ORANGE),
 }
 _SINGLE_TASK = {
-  "dac": Style("DAC", _PINK, ":"),
-  "bc": Style("BC", _BLACK, ":"),
-  "bc_less": Style("BC (less data)", _YELLOW, ":"),
+  "dac": Style("DAC", drawing.PINK, ":"),
+  "bc": Style("BC", drawing.BLACK, ":"),
+  "bc_less": Style("BC (less data)", drawing.YELLOW, ":"),
 }
 _TRANSFER = {
-  "lfgp": Style("LfGP from scratch", _BLUE),
-  "lfgp_transfer": Style("LfGP, transferred", _ORANGE),
+  "lfgp": Style("LfGP from scratch", drawing.BLUE),
+  "lfgp_transfer": Style("LfGP, transferred", drawing.ORANGE),
 }
 _PLAY = {
-  "lfgp": Style("LfGP, reset-based data", _BLUE),
-  "lfgp_play": Style("LfGP, play-based data", _ORANGE),
+  "lfgp": Style("LfGP, reset-based data", drawing.BLUE),
+  "lfgp_play": Style("LfGP, play-based data", drawing.ORANGE),
 }
 _ALL = ("all", "all")  # the cell of all main tasks together
 COLUMNS = ("main_task", "task", "method", "env_step", "runs", "estimate",
@@ -65,8 +58,8 @@ def draw(
       task, the others show main tasks alone.
     runs: of the study, as `read_runs` sorts them; those of other methods are
       left out.
-    output: the picture; its suffix chooses the format. The numbers go to the
-      same name with `.csv`.
+    output: the picture; its suffix chooses the format. The numbers go to
+      its name and `.csv`, such as `main.png.csv`.
     quantity: "success" or "return".
     kind: a key of `statistics.ESTIMATORS`.
 
@@ -101,9 +94,11 @@ def draw(
     raise ValueError(
       f"no run for the figure {name!r}; it shows: {', '.join(styles)}"
     )
-  _save(drawing.figure(cells, lines, styles, quantity, kind, size), output)
+  drawing.save(
+    drawing.figure(cells, lines, styles, quantity, kind, size), output
+  )
   rows = _numbers(lines, kind)
-  csv_files.write(pathlib.Path(output).with_suffix(".csv"), COLUMNS, rows)
+  csv_files.write(f"{os.fspath(output)}.csv", COLUMNS, rows)
   return _notes(styles, runs)
 
 
@@ -120,28 +115,19 @@ def learning_curve(
   method, main_task, *_ = runs[0]
   cell: Cell = (main_task, "")
   lines: Lines = {}
-  styles = {}
   tasks = dict.fromkeys(row.task for run in runs for row in run.rows)
-  for i, task in enumerate(tasks):
+  for task in tasks:
     curve = run_results.curve([(runs, task)], quantity)
     if curve is not None:
       lines[cell, task] = curve, statistics.mean(curve.scores)
-      colour, marker = _COLOURS[i % 7], _MARKERS[i % 7]
-      styles[task] = Style(task.replace("_", " "), colour, "-", marker)
   if not lines:
     paths = ", ".join(str(run.path) for run in runs)
     raise ValueError(f"no {quantity} in the evaluations of {paths}")
-  drawn = drawing.figure([[cell]], lines, styles, quantity, "mean", (7.0, 4.0))
+  styles, size = drawing.styles_of(tasks), (7.0, 4.0)
+  drawn = drawing.figure([[cell]], lines, styles, quantity, "mean", size)
   drawn.suptitle(f"{method} on {main_task}".replace("_", " "), fontsize=11)
-  _save(drawn, output)
+  drawing.save(drawn, output)
   return run_results.uneven(runs)
-
-
-def _save(figure: matplotlib.figure.Figure, output: files.Path) -> None:
-  output = pathlib.Path(output)
-  output.parent.mkdir(parents=True, exist_ok=True)
-  with files.replacing(output) as aside:
-    figure.savefig(aside, dpi=200)
 
 
 def _numbers(lines: Lines, kind: str) -> list[dict[str, Any]]:

@@ -54,7 +54,9 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
       notes.append(f"{path}: nothing was evaluated yet, left out")
       continue
     main_task, seed = str(config.get("main_task", "?")), config.get("seed", 0)
-    run = Run(method_of(config), main_task, int(seed), path, rows)
+    if not isinstance(seed, int):
+      raise ValueError(f"{path / run_folder.CONFIG_NAME}: seed is {seed!r}")
+    run = Run(method_of(config), main_task, seed, path, rows)
     other = runs.setdefault(run[:3], run)
     if other.path.resolve() != path.resolve():
       raise ValueError(
@@ -70,7 +72,7 @@ def method_of(config: Mapping[str, Any]) -> str:
   Else with `_play` if the demonstrations' folder is named so, as `stack_play`.
   """
   algorithm = str(config.get("algorithm", "?"))
-  folder = pathlib.Path(config.get("demonstrations") or "")
+  folder = pathlib.Path(str(config.get("demonstrations") or ""))
   if config.get("transfer_from"):
     return f"{algorithm}_transfer"
   return f"{algorithm}_play" if "play" in folder.name.split("_") else algorithm

@@ -1,4 +1,4 @@
-"""Estimates from a few runs: mean, and interquartile mean.
+"""Estimates from a few runs: mean, interquartile mean, improvement.
 
 The paper reports mean and standard deviation. With few seeds the interquartile
 mean with stratified bootstrap intervals is the steadier summary (Agarwal et
@@ -40,6 +40,41 @@ def interquartile_mean(scores: np.ndarray) -> Estimate:
     return scipy.stats.trim_mean(together, _TRIMMED, axis=axis)
 
   return _bootstrap(statistic, *scores.transpose(1, 2, 0))
+
+
+def probability_of_improvement(
+  scores: np.ndarray, baseline: np.ndarray
+) -> Estimate:
+  """Chance that a run beats a run of the baseline, and its 95 % interval.
+
+  Args:
+    scores: float [R, K, T].
+    baseline: float [S, K, T], the same tasks and points.
+
+  Returns:
+    The mean over tasks of P(X > Y) + P(X = Y) / 2, the Mann-Whitney statistic
+    over the number of pairs.
+  """
+  tasks = scores.shape[1]
+
+  def statistic(*samples: np.ndarray, axis: int) -> np.ndarray:
+    del axis  # the last
+    wins = [
+      np.sign(x[..., :, None] - y[..., None, :]).mean(axis=(-2, -1))
+      for x, y in zip(samples[:tasks], samples[tasks:], strict=True)
+    ]
+    return 0.5 + 0.5 * np.mean(wins, axis=0)
+
+  return _bootstrap(
+    statistic, *scores.transpose(1, 2, 0), *baseline.transpose(1, 2, 0)
+  )
+
+
+def share(value: float, episodes: int) -> Estimate:
+  """A share of so many episodes, and Wilson's 95 % interval; [1] each."""
+  found = scipy.stats.binomtest(round(value * episodes), episodes)
+  low, high = found.proportion_ci(method="wilson")
+  return Estimate(*np.array([[value], [low], [high]]))
 
 
 ESTIMATORS: dict[str, Callable[[np.ndarray], Estimate]] = {

@@ -11,6 +11,7 @@ _BAD = (
   ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
   ("train.py --flagfile=no.flags", "no.flags"),
   ("train.py --config.seed=many", "flag --config.seed=many"),
+  ("train.py --config.threads=9999999", "config.threads is 9999999; valid:"),
   ("train.py --resume", "--resume needs --run"),
   ("train.py --resume --run=no/run", "no run folder no/run"),
   ("evaluate.py stack", "unexpected argument 'stack'"),
@@ -20,10 +21,24 @@ _BAD = (
   ("evaluate.py --expert=mine", "should be one of <scripted>"),
   ("evaluate.py --expert=scripted --episodes=0", "not a positive integer"),
   ("render_policy.py --expert=scripted --task=juggle", "valid: stack, "),
+  ("render_policy.py --expert=scripted --height=99999", "4320"),
   ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
+  (
+    "evaluate.py --expert=scripted --output=a_file/b",
+    "a_file/b/evaluation.csv",
+  ),
+  ("render_policy.py --expert=scripted --output=a_file/b.mp4", "a_file/b.mp4"),
+  ("plot.py --runs=no/run --output=a_file", "Not a directory"),
+  ("benchmark.py --output=a_file/b.csv", "a_file/b.csv"),
+  ("train.py --run=a_file/b", "a_file/b/config.json"),
   ("view.py --task=juggle", "--task=juggle is unknown; valid: stack"),
   ("view.py --task=stack", "the viewer needs a display"),
-  ("plot.py", "--runs is missing"),
+  ("plot.py", "give one of --run=FOLDER, --runs=FOLDER,... and --attempts="),
+  ("plot.py --run=a --runs=b", "give one of --run=FOLDER, --runs=FOLDER,..."),
+  ("plot.py --run=no/run", "no run folder no/run"),
+  ("plot.py --run=.", ". is not a run: it has no config.json"),
+  ("plot.py --run=a --quantity=return", "--quantity goes with --runs"),
+  ("plot.py --attempts=no.csv", "No such file or directory: 'no.csv'"),
   ("plot.py --runs=no/run", "no run folder no/run"),
   ("benchmark.py --tasks=juggle", "--tasks=juggle is unknown"),
   ("sweep.py --seeds=a", "--seeds: invalid literal"),
@@ -46,6 +61,7 @@ _COLLECTION = (
   ("--output=new --expert=no/run", "no run folder no/run"),
   ("", "--output is not set"),
   ("--output=old", "--output=old exists; valid: a new folder"),
+  ("--output=a_file/b", "a_file/b"),
 )
 
 
@@ -72,6 +88,7 @@ class BadInputTest(FolderTest):
   def test_is_told_in_a_line_and_leaves_nothing(self):
     folder = self.folder
     (folder / "old").mkdir()
+    (folder / "a_file").touch()
     collect = "collect_demonstrations.py"
     of_collection = ((f"{collect} {line}", said) for line, said in _COLLECTION)
     for line, message in (*_BAD, *of_collection):
@@ -80,5 +97,5 @@ class BadInputTest(FolderTest):
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn(message, done.stderr)
         self.assertRegex(done.stderr, r"\Aerror: .*\n\Z")
-    self.assertEqual(os.listdir(folder), ["old"])
+    self.assertCountEqual(os.listdir(folder), ["old", "a_file"])
     self.assertEmpty(os.listdir(folder / "old"))

@@ -8,7 +8,7 @@ import tempfile
 from absl.testing import absltest
 
 from lfgp_dmc import graphics, task_names
-from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.launch import command, policies, training
 from lfgp_dmc.pictures import video
 from tests.fixtures import FolderTest
@@ -77,6 +77,7 @@ class BlockRunTest(absltest.TestCase):
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 400 environment steps", done.stdout)
     self.assertIn("policy       runs/tiny/policy.safetensors", done.stdout)
+    self.assertTrue((self.path / "learning_curve.png").exists())
 
   def test_evaluates_the_run_and_refuses_to_overwrite(self):
     line = "evaluate.py --run=runs/tiny --episodes=2 --workers=1 --output=out"
@@ -118,6 +119,21 @@ class BlockRunTest(absltest.TestCase):
     done = self._call("plot.py --runs=runs/tiny --output=figures")
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertTrue((self.folder / "figures/lfgp_bring_success.png").exists())
+    done = self._call("plot.py --run=runs/tiny --output=figures --format=svg")
+    self.assertEqual(done.stdout, "figures/tiny.svg\n")
+    self.assertIn("<svg", (self.folder / "figures/tiny.svg").read_text())
+
+  def test_plots_success_by_attempts_beside_its_csv(self):
+    (self.folder / "few.csv").write_text(
+      "method,main_task,attempts,seed,success\nbc,lift,5,0,0.5\n"
+    )
+    done = self._call("plot.py --attempts=few.csv --baseline=bc")
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertIn("| BC | 5 | 50 % |", done.stdout)
+    self.assertEndsWith(done.stdout, "few.png\nfew_iqm.csv\n")
+    self.assertTrue((self.folder / "few.png").exists())
+    _, (row,) = csv_files.read(self.folder / "few_iqm.csv")
+    self.assertEqual((row["main_task"], row["success"]), ("lift", "0.5"))
 
   def test_renders_intention_and_schedule_in_every_format(self):
     if graphics.fault():
@@ -132,7 +148,9 @@ class BlockRunTest(absltest.TestCase):
       self.assertGreater(
         (self.folder / f"clip_{task}{suffix}").stat().st_size, 100
       )
-      sidecar = json.loads((self.folder / f"clip_{task}.json").read_text())
+      sidecar = json.loads(
+        (self.folder / f"clip_{task}{suffix}.json").read_text()
+      )
       self.assertEqual((sidecar["task"], sidecar["steps"]), (task, 10))
 
   def test_renders_play_by_the_expert(self):
@@ -142,7 +160,7 @@ class BlockRunTest(absltest.TestCase):
                       "--height=64 --width=64 --every=20 "
                       "--output=play.png")  # fmt: skip
     self.assertEqual(done.returncode, 0, done.stderr)
-    sidecar = json.loads((self.folder / "play.json").read_text())
+    sidecar = json.loads((self.folder / "play.png.json").read_text())
     self.assertGreater(len(sidecar["intentions"]), 2)
     self.assertNotIn("GLFW", done.stderr)
 

@@ -37,6 +37,11 @@ class EnvironmentSpecTest(fixtures.FolderTest, parameterized.TestCase):
     env = EnvironmentSpec("right", "my_own_world:wide").build()
     self.assertEqual(env.action_spec().maximum, 1.0)
 
+  @parameterized.parameters(([1], ""), (None, ""), ("right", 3))
+  def test_what_is_no_text_is_named(self, *names):
+    with self.assertRaisesRegex(ValueError, "config.*valid: a text"):
+      EnvironmentSpec(*names).check()
+
   @parameterized.parameters(
     ("my_own_world:with_size", "missing a required argument: 'size'; valid"),
     ("my_own_world:nowhere", "no attribute 'nowhere'; valid"),

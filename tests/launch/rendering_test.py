@@ -16,6 +16,7 @@ import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import clips, command, policies, view
+from lfgp_dmc.pictures import video
 from lfgp_dmc.pictures.recorder import Look
 from tests.fixtures import FolderTest
 from tests.launch import fixtures
@@ -74,7 +75,7 @@ class RenderingTest(FolderTest):
     self.assertEqual(done.returncode, 0, done.stderr)
     path = self.folder / name
     read = imageio.mimread if path.suffix == ".gif" else imageio.imread
-    return read(path), json.loads(path.with_suffix(".json").read_text())
+    return read(path), json.loads(video.sidecar(path).read_text())
 
   def test_a_grid_shows_several_seeds_of_an_intention(self):
     frames, sidecar = self._rendered(

@@ -39,6 +39,7 @@ class SweepCommandTest(FolderTest):
     self.assertEqual(row["state"], "stopped")
     self.assertGreater(float(row["wall_s"]), 0)
     self.assertNotEmpty(os.listdir(run / "checkpoints"))
+    self.assertTrue((run / "learning_curve.png").exists())
     self.assertIn("stopped at", log.read_text())
     done = self._call()
     self.assertEqual(done.returncode, 0, done.stderr)

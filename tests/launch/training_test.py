@@ -1,5 +1,6 @@
 """A run from its config to its files, continued, and refused."""
 
+import shutil
 from unittest import mock
 
 import numpy as np
@@ -39,6 +40,44 @@ class TrainingTest(fixtures.RunTest):
     ):
       self.train(self.config(**changed), resume=True)
 
+  def test_resumes_further_with_data_that_moved(self):
+    whole, _ = self.train(self.config(env_steps=200), "whole")
+    run, _ = self.train(self.config(env_steps=100, replay_capacity=200))
+    self.dataset.rename(self.folder / "moved")
+    line = "train.py --run=runs/a --resume"
+    done = fixtures.call(line, self.folder)
+    self.assertRegex(done.stderr, r"\Aerror: no dataset folder .*data")
+    line += " --config.env_steps=200 --config.demonstrations=moved"
+    done = fixtures.call(line, self.folder)
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertEqual(fixtures.numbers(run), fixtures.numbers(whole))
+    stored = run_folder.read_config(run)
+    self.assertEqual((stored["env_steps"], stored["demonstrations"]),
+                     (200, "moved"))  # fmt: skip
+    for flag, said in (
+      ("config.env_steps=100", r"Differing: env_steps \(200, now 100\)"),
+      ("config.agent.scheduler.xi=9", r"Differing: .*xi \(5, now 9\)"),
+      ("config.agent.scheduler.kind=uniform", r"kind \(.*, now .*uniform"),
+      ("config.algorithm=bc", "Differing: algorithm"),
+      ("preset=fast", "agent.prior.weight"),
+    ):
+      done = fixtures.call(f"{line} --{flag}", self.folder)
+      self.assertRegex(done.stderr, rf"\Aerror: runs/a was.*{said}.*\n\Z")
+
+  def test_a_ring_that_had_no_slack_resumes_further(self):
+    self.train(self.config(env_steps=40, replay_capacity=60))
+    config = self.config(env_steps=120, replay_capacity=60)
+    self.assertTrue(self.train(config, resume=True)[1].is_complete)
+
+  def test_other_demonstrations_are_not_resumed(self):
+    self.train(self.config(env_steps=40))
+    shutil.rmtree(self.dataset)
+    fixtures.write_dataset(self.dataset, pairs=61)
+    with self.assertRaisesRegex(
+      UserError, "valid: the same data that the run was"
+    ):
+      self.train(self.config(env_steps=40), resume=True)
+
   def test_an_existing_folder_is_refused(self):
     run = self.folder / "runs" / "a"
     run.mkdir(parents=True)
@@ -54,11 +93,37 @@ class TrainingTest(fixtures.RunTest):
     ({"device": "abacus"}, "config.device is 'abacus'"),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
     ({"main_task": "up"}, "up.hdf5: missing"),
+    ({"agent.networks.hidden_size": 10**6}, "hidden_size is 1000000: it needs"),
+    ({"agent.networks.hidden_size": 10**12}, "hidden_size is 1000000000000"),
+    ({"agent.batch_size": 10**12}, "config.agent.batch_size is 1000000000000"),
+    ({"agent.reward.batch_size": 10**12}, "agent.reward.batch_size is 1000000"),
+    ({"replay_capacity": 10**20}, "config.replay_capacity is 1000000000000000"),
     ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
   )
   def test_bad_input_leaves_no_folder(self, changes, message):
     with self.assertRaisesRegex(UserError, message):
       self.train(self.config(**changes))
+    self.assertFalse((self.folder / "runs" / "a").exists())
+
+  @parameterized.parameters(
+    ("lfgp_dmc.launch.assemble.make_agent", MemoryError("9 GB"), UserError),
+    (
+      "lfgp_dmc.launch.assemble.make_agent",
+      KeyboardInterrupt(),
+      KeyboardInterrupt,
+    ),
+    ("lfgp_dmc.launch.assemble.make_agent", KeyError("ours"), KeyError),
+    ("fcntl.flock", OSError(37, "No locks"), OSError),
+    ("lfgp_dmc.runs.run_folder.files.write_json", OSError(28, "full"), OSError),
+  )
+  def test_whatever_happens_before_the_start_no_folder_is_left(
+    self, place, fault, raised
+  ):
+    with (
+      mock.patch(place, side_effect=fault),
+      self.assertRaises(raised),
+    ):
+      self.train(self.config())
     self.assertFalse((self.folder / "runs" / "a").exists())
 
   def test_every_fault_of_a_dataset_is_told(self):

@@ -59,6 +59,17 @@ class PublishedExamplesTest(FolderTest):
     ):
       self.read("stack", "lift", "bring", "insert")
 
+  @parameterized.parameters(b"", b"PK\x03\x04nothing")
+  def test_a_damaged_file_is_named(self, content):
+    (self.folder / "lift.npz").write_bytes(content)
+    with self.assertRaisesRegex(demonstrations.DatasetError, "lift.npz: "):
+      self.read("lift")
+
+  def test_stray_files_are_no_examples(self):
+    for path in self.folder.iterdir():
+      path.rename(path.with_name(f"._{path.name}"))
+    self.assertFalse(published_examples.is_folder_of_examples(self.folder))
+
   @parameterized.parameters("stack", "lift", "reach")
   def test_our_conditions_hold_on_98_percent_of_the_states(self, task):
     data, env = self.read(task)[task], fixtures.environment()

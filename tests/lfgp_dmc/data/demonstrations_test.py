@@ -93,9 +93,19 @@ class DemonstrationsTest(fixtures.FolderTest):
     with self.assertRaises(FileExistsError):
       self._write()
     with self.assertRaisesRegex(FileExistsError, "never written into"):
-      demonstrations.create_folder(self.folder)
-    new = demonstrations.create_folder(self.folder / "a" / "b")
-    self.assertTrue(new.is_dir())
+      demonstrations.write_folder(self.folder, {})
+
+  @parameterized.parameters(
+    ({"action": np.ones(3)},), ({"attributes": {"task": "x"}},), ({},)
+  )
+  def test_a_folder_is_whole_or_absent(self, change):
+    bad = dataclasses.replace(_DATA, **change)
+    found = {"reach": _DATA, "lift" if change else "a/b": bad}
+    with self.assertRaises(DatasetError):
+      demonstrations.write_folder(self.folder / "new", found)
+    self.assertEmpty(list(self.folder.iterdir()))
+    demonstrations.write_folder(self.folder / "new", {"reach": _DATA})
+    self.assertLen(list(self.folder.iterdir()), 1)
 
   def test_bad_data_are_not_written(self):
     bad = dataclasses.replace(_DATA, action=np.full((6, 2), 2, np.float32))
@@ -117,6 +127,26 @@ class DemonstrationsTest(fixtures.FolderTest):
     with h5py.File(self._path, "r+") as file:
       file.attrs[name] = value
     self.assertIn(message, self._read_error())
+
+  @parameterized.parameters(*_BAD_ATTRIBUTES, "main_task", "expert")
+  def test_an_attribute_of_another_type_is_named(self, name):
+    self._write()
+    for value in (np.arange(3), np.array(["a", "b"], "S"), h5py.Empty("f")):
+      with h5py.File(self._path, "r+") as file:
+        file.attrs[name] = value
+      self.assertRegex(self._read_error(), f"{name} is a (ndarray|Empty)")
+
+  @parameterized.parameters(*_DATA.arrays())
+  def test_an_array_that_declares_more_than_there_is(self, name):
+    self._write()
+    with h5py.File(self._path, "r+") as file:
+      del file[name]
+      file.create_dataset(name, (10**12,), np.float32)
+    self.assertRegex(self._read_error(), f"'{name}' declares 4,000,000,000,000")
+    with h5py.File(self._path, "r+") as file:
+      del file[name]
+      file[name] = h5py.Empty("f")
+    self._read_error()
 
   def test_missing_key_and_missing_attribute(self):
     self._write()

@@ -6,6 +6,7 @@ import unittest
 from unittest import mock
 
 import numpy as np
+from absl.testing import parameterized
 
 from lfgp_dmc.data import demonstrations
 
@@ -32,7 +33,8 @@ class MinariTest(fixtures.FolderTest):
 
   def test_comes_back_as_it_went(self):
     data = fixtures.demonstrations(4, 1, 6)
-    stored = minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
+    minari_datasets.to_minari({"lfgp_dmc/a/reach-v0": data})
+    stored = minari.load_dataset("lfgp_dmc/a/reach-v0")
     self.assertEqual((stored.total_episodes, stored.total_steps), (3, 11))
     first, _, last = list(minari.load_dataset("lfgp_dmc/a/reach-v0"))
     self.assertEqual(first.observations.shape, (5, 5))
@@ -45,13 +47,42 @@ class MinariTest(fixtures.FolderTest):
     self.assertEqual(back.attributes, fixtures.ATTRIBUTES)
     demonstrations.write(self.folder / "reach.hdf5", back)
     with self.assertRaisesRegex(ValueError, "exists; choose another"):
-      minari_datasets.to_minari(data, "lfgp_dmc/a/reach-v0")
+      minari_datasets.to_minari({"lfgp_dmc/a/reach-v0": data})
+    minari_datasets.to_minari({"lfgp_dmc/a/lift-v0": data})
+    self.assertLen(minari.list_local_datasets(), 2)
+    with self.assertRaisesRegex(ValueError, "exists; choose another"):
+      minari_datasets.to_minari({"lfgp_dmc/a/reach-v0/lift-v0": data})
+
+  @parameterized.parameters(
+    "my lab/reach-v0", "ab/reach", "ab/rea ch-v0", "/reach-v0", "../reach-v0",
+    "a//reach-v0", "", "ab/.reach-v0", "/tmp/ab/reach-v0", "reach-v0/",
+  )  # fmt: skip
+  def test_a_bad_name_leaves_the_store_as_it_was(self, name):
+    data = fixtures.demonstrations(4, 1)
+    with self.assertRaisesRegex(ValueError, "is no name of Minari"):
+      minari_datasets.to_minari({"ab/lift-v0": data, name: data})
+    self.assertEmpty(minari.list_local_datasets())
+    self.assertEmpty(os.listdir(self.folder / "minari"))
+
+  def test_a_failure_midway_leaves_the_store_as_it_was(self):
+    data = fixtures.demonstrations(4, 1)
+    with (
+      mock.patch.object(
+        minari_datasets.json, "dumps", side_effect=["{}", OSError("full")]
+      ),
+      self.assertRaisesRegex(OSError, "full"),
+    ):
+      minari_datasets.to_minari({"ab/lift-v0": data, "ab/reach-v0": data})
+    self.assertEmpty(os.listdir(self.folder / "minari"))
+    self.assertEqual(
+      os.environ["MINARI_DATASETS_PATH"], str(self.folder / "minari")
+    )
 
   def test_what_does_not_fit_is_named(self):
     data = fixtures.demonstrations(4, 1, 6)
     data.observation[2] += 1
     with self.assertRaisesRegex(ValueError, "row 2 does not start where"):
-      minari_datasets.to_minari(data, "a-v0")
+      minari_datasets.to_minari({"a-v0": data})
     with self.assertRaisesRegex(ValueError, "no local Minari dataset a-v0"):
       minari_datasets.from_minari("a-v0")
     buffer = data_collector.EpisodeBuffer(
@@ -75,6 +106,14 @@ class MinariTest(fixtures.FolderTest):
     ours = self.folder / "ours"
     ours.mkdir()
     demonstrations.write(ours / "reach.hdf5", fixtures.demonstrations(4, 1, 6))
+    (ours / "._reach.hdf5").write_bytes(b"of another system")
+    (ours / ".lift.99.partial.hdf5").write_bytes(b"of a killed process")
+    (ours / "stack.hdf5").write_bytes(b"damaged")
+    line = "convert_minari.py --minari=lfgp_dmc/b --dataset=ours"
+    done = launch_fixtures.call(line, self.folder)
+    self.assertEqual(done.returncode, 1)
+    self.assertRegex(done.stderr, r"\Aerror: ours/stack.hdf5: not .*\n\Z")
+    (ours / "stack.hdf5").unlink()
     for arguments, said in (
       ("--dataset=ours", "lfgp_dmc/b/reach-v0"),
       ("--dataset=new --back --attributes=expert=me,seed=9", "new/reach.hdf5"),

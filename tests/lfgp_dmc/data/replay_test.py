@@ -153,15 +153,15 @@ class MappedReplayTest(fixtures.FolderTest):
 
   def test_damaged_files_are_named(self):
     Replay(4, 3, 2, self._folder).flush()
-    (self._folder / "replay.json").write_text(json.dumps({"total": 1}))
-    with self.assertRaisesRegex(ValueError, "replay.json is damaged"):
-      Replay(4, 3, 2, self._folder)
     path = self._folder / "action.npy"
     path.write_bytes(path.read_bytes()[:-1])
     with self.assertRaisesRegex(ValueError, "action.npy is damaged"):
       Replay(4, 3, 2, self._folder)
     path.unlink()
     with self.assertRaisesRegex(ValueError, "action.npy is damaged: it is mis"):
+      Replay(4, 3, 2, self._folder)
+    (self._folder / "replay.json").write_text(json.dumps({"total": 1}))
+    with self.assertRaisesRegex(ValueError, "replay.json is damaged"):
       Replay(4, 3, 2, self._folder)
 
   def test_other_reward_tasks_are_refused(self):

@@ -8,7 +8,7 @@ from absl.testing import absltest, parameterized
 
 from lfgp_dmc.pictures import film_strips, video
 from lfgp_dmc.pictures.recorder import Clip, Look
-from tests.fixtures import FolderTest
+from tests.fixtures import FolderTest, full_disk
 
 
 def _frames(count=8, height=47, width=63):
@@ -25,9 +25,24 @@ class VideoTest(FolderTest):
     read = imageio.mimread(path)
     self.assertLen(read, 8)
     self.assertLess(np.abs(read[4][20, 24, :3] - [250.0, 80, 20]).max(), 60)
-    sidecar = json.loads(path.with_suffix(".json").read_text())
+    sidecar = json.loads((path.parent / f"{name}.json").read_text())
     self.assertEqual((sidecar["frames"], sidecar["seed"]), (8, 3))
     self.assertLen(list(path.parent.iterdir()), 2)
+
+  def test_nothing_else_is_overwritten(self):
+    config = self.folder / "config.json"
+    config.write_text("kept")
+    for name in ("config.png", "config.gif"):
+      video.write(self.folder / name, _frames(2))
+    self.assertEqual(config.read_text(), "kept")
+    self.assertLen(list(self.folder.iterdir()), 5)
+
+  @parameterized.parameters("a.mp4", "a.gif", "a.png")
+  def test_a_full_disk_leaves_no_torn_clip(self, name):
+    noise = np.random.default_rng(0).integers(0, 255, (9, 160, 160, 3))
+    with full_disk(), self.assertRaisesRegex(OSError, name):
+      video.write(self.folder / name, noise.astype(np.uint8))
+    self.assertEmpty(list(self.folder.iterdir()))
 
   def test_a_strip_of_frames(self):
     frames = video.film_strip(_frames(), 3)

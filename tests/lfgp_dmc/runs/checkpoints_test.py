@@ -1,6 +1,5 @@
 """Checkpoints: round trip, thinning, damage, interruption."""
 
-import pathlib
 from unittest import mock
 
 import numpy as np
@@ -83,14 +82,37 @@ class CheckpointsTest(fixtures.FolderTest):
   def test_none_is_none(self):
     self.assertIsNone(checkpoints.latest(self._folder))
 
-  def test_a_failed_save_leaves_the_earlier_ones(self):
+  def test_a_full_disk_is_named_and_leaves_the_earlier_ones(self):
     self._save(1)
-    full = mock.patch.object(
-      pathlib.Path, "write_text", side_effect=OSError(28, "No space left")
-    )
-    with full, self.assertRaisesRegex(OSError, "No space"):
-      self._save(2)
+    for state, said in (
+      ({"a": np.zeros(9000)}, "it needs 0.0721 MB: .*arrays.safetensors"),
+      ({"a": "x" * 90_000}, "it needs 0.09 MB: .*state.json"),
+    ):
+      with fixtures.full_disk(), self.assertRaisesRegex(OSError, said):
+        checkpoints.save(self._folder, 2, state)
     self.assertEqual([p.name for p in self._folder.iterdir()], ["000000001"])
+    self.assertEqual(checkpoints.load(self._folder / "000000001"), {"step": 1})
+
+  def test_everybody_may_read_it(self):
+    path = checkpoints.save(self._folder, 1, _STATE)
+    modes = {file.stat().st_mode & 0o777 for file in path.iterdir()}
+    ours = self.folder / "ours"
+    ours.touch()
+    self.assertEqual(modes, {ours.stat().st_mode & 0o777})
+
+  def test_what_may_not_be_read_is_not_damaged(self):
+    path = checkpoints.save(self._folder, 1, _STATE)
+    refused = mock.patch("builtins.open", side_effect=PermissionError(13, "no"))
+    with refused, self.assertRaises(PermissionError):
+      checkpoints.load(path)
+    with refused, self.assertRaises(PermissionError):
+      checkpoints.latest(self._folder)
+
+  def test_what_is_no_checkpoint_is_left_out(self):
+    self._save(1)
+    (self._folder / "._000000001").touch()
+    (self._folder / "²").touch()
+    self.assertEqual(self._steps(), [1])
 
   def test_what_a_killed_process_left_is_cleared(self):
     self._save(1)

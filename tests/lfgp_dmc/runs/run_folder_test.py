@@ -20,6 +20,21 @@ class FilesTest(fixtures.FolderTest):
     self.assertEqual(files.read_json(path), {"kept": 1})
     self.assertLen(list(self.folder.iterdir()), 1)
 
+  def test_a_full_disk_names_the_file(self):
+    path = self.folder / "a.csv"
+    csv_files.write(path, ["env_step"], [{"env_step": 1}])
+    many = [{"env_step": 10**9}] * 9000
+    for write in (csv_files.write, csv_files.append):
+      with fixtures.full_disk(), self.assertRaisesRegex(OSError, "a.csv"):
+        write(path, ["env_step"], many)
+
+  def test_a_damaged_csv_is_named(self):
+    path = self.folder / "a.csv"
+    for content in (b"env_step\n\xff\n", b"a\n1\n", b"env_step\nx\n"):
+      path.write_bytes(content)
+      with self.assertRaisesRegex(ValueError, "a.csv is"):
+        csv_files.truncate_after(path, 0)
+
   def test_bad_json_is_named(self):
     path = self.folder / "a.json"
     path.write_text("{")

@@ -37,6 +37,18 @@ class StatisticsTest(absltest.TestCase):
     found = statistics.interquartile_mean(np.full((1, 1, 3), 0.25))
     np.testing.assert_allclose(found, np.full((3, 3), 0.25))
 
+  def test_probability_of_improvement(self):
+    # First task: 3 wins of 4 pairs; second: 4 ties.
+    found = statistics.probability_of_improvement(
+      _scores([1, 3], [1, 1]), _scores([2, 0], [1, 1])
+    )
+    # Resamples of the first task range from (1, 1) against (2, 2) to all wins.
+    np.testing.assert_allclose(found, [[0.625], [0.25], [0.75]])
+    better = statistics.probability_of_improvement(
+      _scores([3, 4, 5]), _scores([1, 2])
+    )
+    np.testing.assert_allclose(better, [[1.0], [1.0], [1.0]])
+
 
 class StudyTest(FolderTest):
   def _write(self, algorithm, main_task, seed, scores, **config):
@@ -92,6 +104,14 @@ class StudyTest(FolderTest):
     with self.assertRaisesRegex(ValueError, "both lfgp on stack with seed 0"):
       self._read()
 
+  def test_a_config_of_odd_types_is_named(self):
+    self._write("lfgp", "stack", 0, {0: 0}, demonstrations=[1])
+    self.assertLen(self._read(), 1)
+    for seed in ("a", None, [1]):
+      self._write("lfgp", "stack", seed, {0: 0})
+      with self.assertRaisesRegex(ValueError, "config.json: seed is"):
+        self._read()
+
   def test_a_run_without_evaluation_is_noted(self):
     self._write("lfgp", "stack", 0, {})
     runs, notes = run_results.read_runs([self.folder / "lfgp_*"])
@@ -121,7 +141,7 @@ class StudyTest(FolderTest):
     picture = imageio.imread(path)
     self.assertGreater(picture.shape[1], 1500)
     self.assertGreater(np.ptp(picture[..., :3]), 200)
-    columns, rows = csv_files.read(path.with_suffix(".csv"))
+    columns, rows = csv_files.read(f"{path}.csv")
     self.assertEqual(columns, list(figures.COLUMNS))
     found = {tuple(row.values())[:4]: row for row in rows}
     last = found["bring", "bring", "lfgp", "200"]
@@ -140,7 +160,7 @@ class StudyTest(FolderTest):
     path = self.folder / "bars.pdf"
     figures.draw("main", self._read(), path)
     self.assertTrue(path.read_bytes().startswith(b"%PDF"))
-    (row,) = csv_files.read(path.with_suffix(".csv"))[1]
+    (row,) = csv_files.read(f"{path}.csv")[1]
     self.assertEqual((row["env_step"], row["middle"]), ("", "0.25"))
 
   def test_learning_curves_of_one_run_and_of_several(self):

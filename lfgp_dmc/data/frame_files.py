@@ -2,7 +2,10 @@
 
 import tempfile
 
+import h5py
 import numpy as np
+
+_BLOCK = 16  # rows that are compressed together
 
 
 class FrameFile:
@@ -30,3 +33,28 @@ class FrameFile:
     self._file.flush()
     shape = (self._rows, *self._shape)
     return np.memmap(self._file, np.uint8, "r", shape=shape)
+
+
+def pack(file: h5py.File, name: str, frames: np.ndarray) -> None:
+  """Writes a dataset block by block, with a checksum on each."""
+  stored = file.create_dataset(
+    name,
+    frames.shape,
+    np.uint8,
+    chunks=(min(_BLOCK, len(frames)), *frames.shape[1:]),
+    compression="gzip",
+    compression_opts=1,
+    fletcher32=True,
+  )
+  for start in range(0, len(frames), _BLOCK):
+    stored[start : start + _BLOCK] = frames[start : start + _BLOCK]
+
+
+def unpack(stored: h5py.Dataset) -> np.ndarray:
+  """A dataset's rows in an unnamed file; what are no frames are not read."""
+  if stored.ndim != 5 or stored.dtype != np.uint8:
+    return np.broadcast_to(np.zeros((), stored.dtype), stored.shape)
+  unpacked = FrameFile(stored.shape[1:])
+  for start in range(0, len(stored), _BLOCK):
+    unpacked.append(stored[start : start + _BLOCK])
+  return unpacked.mapped()
