@@ -38,7 +38,7 @@ def load(
   if not folder.exists():
     _collect(config)
   try:
-    if published_examples.is_folder_of_examples(folder):
+    if not frame_shape and published_examples.is_folder_of_examples(folder):
       found = published_examples.read_folder(folder, tasks)
     else:
       found = demonstrations.read_folder(folder, tasks, *widths, frame_shape)

@@ -11,6 +11,7 @@ from typing import Any
 import dm_env
 
 import lfgp_dmc
+from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
 from lfgp_dmc.task_names import check_task
 
@@ -61,6 +62,10 @@ class EnvironmentSpec:
       _imported(self.environment)
     else:
       check_task(self.main_task)
+    if self.camera_size:
+      graphics.allow_pictures()
+      if fault := graphics.fault():
+        raise ValueError(f"config.camera_size is {self.camera_size}: {fault}")
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:

@@ -109,6 +109,11 @@ class RunConfig:
         "mirror_demonstrations is True; valid: False with camera_size (frames "
         "have no mirror image)"
       )
+    if self.camera_size and self.transfer_from:
+      yield (
+        f"transfer_from is {self.transfer_from!r}; valid: nothing with "
+        "camera_size (its features would be another encoder's)"
+      )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"

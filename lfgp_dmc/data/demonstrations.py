@@ -231,15 +231,16 @@ def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
   """Every top-level dataset and every attribute, as NumPy and Python values."""
   arrays = {}
   with h5py.File(path, "r") as file:
-    for name in checks.DTYPES:
-      if name in file and isinstance(file[name], h5py.Dataset):
-        size = file[name].nbytes
+    for name in (*checks.DTYPES, checks.FRAMES):
+      if isinstance(found := file.get(name), h5py.Dataset):
+        size = found.nbytes
         # Compression packs a thousandfold at most.
         if size > 1000 * path.stat().st_size + (1 << 20):
           raise ValueError(f"{name!r} declares {size:,} bytes")
-        arrays[name] = np.asarray(file[name][()])
-    if isinstance(frames := file.get(checks.FRAMES), h5py.Dataset):
-      arrays[checks.FRAMES] = frame_files.unpack(frames)
+        if name == checks.FRAMES:
+          arrays[name] = frame_files.unpack(found)
+        else:
+          arrays[name] = np.asarray(found[()])
     attributes = {
       name: value.item() if isinstance(value, np.generic) else value
       for name, value in file.attrs.items()

@@ -1,15 +1,19 @@
 """From pixels, with a fake camera: cloned, continued, trained, played."""
 
+from unittest import mock
+
 import numpy as np
+from absl.testing import parameterized
 
 import lfgp_dmc
-from lfgp_dmc import toy
+from lfgp_dmc import graphics, toy
 from lfgp_dmc.acting import collection, environments
 from lfgp_dmc.acting.attempts import CollectionPlan, Collector
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from tests import fixtures as shared
 from tests.launch import fixtures
 
@@ -111,3 +115,21 @@ class PixelsTest(fixtures.RunTest):
     with self.assertRaisesRegex(UserError, "has no frames"):
       self.train(self.config("bc", demonstrations=str(self.dataset)))
     self.assertFalse((self.folder / "runs" / "a").exists())
+
+  @mock.patch.object(graphics, "fault", lambda: "no pictures here")
+  def test_without_gl_says_so(self):
+    spec = EnvironmentSpec("reach", camera_size=64)
+    with self.assertRaisesRegex(ValueError, "camera_size is 64: no pictures"):
+      spec.check()
+    with self.assertRaisesRegex(UserError, "no pictures here"):
+      self.train(self.config("bc", environment="", main_task="reach",
+                             camera_size=64))  # fmt: skip
+
+  @parameterized.parameters(
+    ({"mirror_demonstrations": True}, "mirror_demonstrations is True"),
+    ({"transfer_from": "runs/x"}, "transfer_from is 'runs/x'"),
+  )
+  def test_what_does_not_go_with_frames(self, changes, message):
+    with self.assertRaisesRegex(ValueError, message):
+      self.config("lfgp", environment="", main_task="reach", camera_size=64,
+                  **changes)  # fmt: skip
