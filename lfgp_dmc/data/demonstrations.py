@@ -117,8 +117,10 @@ def write(
     **(demonstrations.attributes if attributes is None else attributes),
   }
   arrays = demonstrations.arrays()
+  if demonstrations.frames is not None:
+    arrays[checks.FRAMES] = demonstrations.frames
   faults = checks.of_attributes(attributes, None)
-  faults += _faults(arrays, demonstrations.frames)
+  faults += checks.of_arrays(arrays, None, None)
   if faults:
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
@@ -126,9 +128,10 @@ def write(
   content = io.BytesIO()  # HDF5 has no OSError for a full disk
   with h5py.File(content, "w") as file:
     for name, array in arrays.items():
-      file.create_dataset(name, data=array)
-    if demonstrations.frames is not None:
-      frame_files.pack(file, checks.FRAMES, demonstrations.frames)
+      if name == checks.FRAMES:
+        frame_files.pack(file, name, array)
+      else:
+        file.create_dataset(name, data=array)
     for name, value in attributes.items():
       file.attrs[name] = value
   files.write_bytes(path, content.getvalue())
@@ -152,7 +155,6 @@ def read(
     raise DatasetError(f"{path}: missing")
   try:
     arrays, attributes = _read_all(path)
-    frames = arrays.pop(checks.FRAMES, None)
   except (
     OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
     OverflowError, AttributeError,
@@ -160,12 +162,11 @@ def read(
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
-  sizes = observation_size, action_size
-  faults += _faults(arrays, frames, *sizes, frame_shape)
+  sizes = observation_size, action_size, frame_shape
+  faults += checks.of_arrays(arrays, *sizes)
   if faults:
     raise DatasetError(f"{path}: {'; '.join(faults)}")
-  known = {name: arrays[name] for name in checks.DTYPES}
-  return Demonstrations(**known, attributes=attributes, frames=frames)
+  return Demonstrations(**arrays, attributes=attributes)
 
 
 def read_folder(
@@ -246,12 +247,3 @@ def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
       for name, value in file.attrs.items()
     }
   return arrays, attributes
-
-
-def _faults(
-  arrays, frames, observation_size=None, action_size=None, shape=None
-):
-  faults = checks.of_arrays(arrays, observation_size, action_size)
-  if frames is None or not faults:
-    faults += checks.of_frames(frames, arrays.get("episode"), shape)
-  return faults
