@@ -11,7 +11,8 @@ _BLOCK = 16  # rows that are compressed together
 class FrameFile:
   """Frames in an unnamed file, which goes with its last user.
 
-  Its pages are the system's to drop: a memory-mapped row is read when needed.
+  It lies where TMPDIR says. Its pages are the system's to drop: a row is read
+  when it is needed.
   """
 
   def __init__(self, shape: tuple[int, ...]):

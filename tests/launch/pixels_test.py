@@ -1,5 +1,6 @@
 """From pixels, with a fake camera: cloned, continued, trained, played."""
 
+import unittest
 from unittest import mock
 
 import numpy as np
@@ -133,3 +134,38 @@ class PixelsTest(fixtures.RunTest):
     with self.assertRaisesRegex(ValueError, message):
       self.config("lfgp", environment="", main_task="reach", camera_size=64,
                   **changes)  # fmt: skip
+
+
+@unittest.skipIf(graphics.fault(), graphics.fault())
+class BlockTaskTest(shared.FolderTest):
+  """The commands, with the cameras of a block task."""
+
+  def _call(self, line):
+    done = fixtures.call(line, self.folder)
+    self.assertEqual(done.returncode, 0, done.stderr)
+    return done.stdout
+
+  def test_collects_clones_evaluates_and_films(self):
+    self._call(
+      "collect_demonstrations.py --task=reach --tasks=reach --control_hz=5 "
+      "--pairs_per_task=12 --camera_size=32 --workers=1 --output=data"
+    )
+    found = demonstrations.read(
+      self.folder / "data" / "reach.hdf5", "reach", 18, 4, (2, 32, 32, 3)
+    )
+    self.assertGreater(np.ptp(found.frames[:, 0]), 100)
+    self._call(
+      "train.py --preset=pixels --config.algorithm=bc --config.main_task=reach "
+      "--config.camera_size=32 --config.demonstrations=data --run=run "
+      "--config.env_steps=2 --config.evaluation_episodes=1 "
+      "--config.evaluation_workers=1 --config.agent.encoder.channels=4"
+    )
+    table = self._call(
+      "evaluate.py --run=run --episodes=1 --seed=7 --workers=1"
+    )
+    self.assertIn("reach", table)
+    self._call(
+      "render_policy.py --run=run --steps=2 --height=64 --width=80 "
+      "--output=seen.gif --noshadows"
+    )
+    self.assertTrue((self.folder / "seen.gif").exists())
