@@ -54,8 +54,12 @@ class PixelsTest(fixtures.RunTest):
       small = {"agent.networks.actor_trunk": "own", "env_steps": 100}
     return super().config(
       algorithm=algorithm,
-      environment="tests.fixtures:SeenPoint",
-      **{"demonstrations": str(self.seen), **small, **changes},
+      **{
+        "demonstrations": str(self.seen),
+        "environment": "tests.fixtures:SeenPoint",
+        **small,
+        **changes,
+      },
     )
 
   def test_collected_frames_are_those_of_the_environment(self):
