@@ -58,16 +58,15 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
     environment = config.environment_spec.build(config.agent.keeps_rewards)
     tasks = tasks_of(config, environment)
     shape = environments.frame_shape(environment)
-    size, actions = environments.widths(environment)
-  size -= int(np.prod(shape)) if shape else 0
-  found = datasets.load(config, tasks, (size, actions), shape)
+    widths = environments.widths(environment)
+  found = datasets.load(config, tasks, widths, shape)
   if not shape or ALGORITHMS[config.algorithm].is_supervised:
-    return Parts(environment, tasks, (size, actions), found, device, shape)
+    return Parts(environment, tasks, widths, found, device, shape)
   encoder = _encoder_of(config, folder)
   encode = encoders.as_function(encoder)
   environment = environments.with_features(environment, encode)
   found = {task: _with_features(data, encode) for task, data in found.items()}
-  widths = size + encoder.features, actions
+  widths = environments.widths(environment)
   return Parts(environment, tasks, widths, found, device, shape, encoder)
 
 

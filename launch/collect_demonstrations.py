@@ -13,7 +13,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc.acting import collection, environments
 from lfgp_dmc.acting.attempts import CollectionPlan
-from lfgp_dmc.data import demonstrations, files
+from lfgp_dmc.data import demonstration_summary, demonstrations, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.task_names import CONTROL_RATES
 from lfgp_dmc.types import Actor
@@ -99,7 +99,7 @@ def main() -> int:
   }
   with command.checked_input():
     demonstrations.write_folder(output, data)
-  print(f"{demonstrations.summary_table(data)}\n")
+  print(f"{demonstration_summary.table(data)}\n")
   what = "attempts"
   if _LONGEST.value > 1:
     what = f"choices of {_LONGEST.value} attempts"

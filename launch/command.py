@@ -12,11 +12,12 @@ from typing import TypeVar
 from absl import app, flags
 from absl import logging as absl_logging
 
-from lfgp_dmc import graphics
+from lfgp_dmc import graphics, signals
+from lfgp_dmc.acting.workers import LostWorkerError
 
 _T = TypeVar("_T", str, int)
 
-INTERRUPTED = 130  # exit status after SIGINT or SIGTERM
+INTERRUPTED = 130  # exit status after SIGINT, SIGTERM or SIGHUP
 
 
 class UserError(Exception):
@@ -40,6 +41,7 @@ def run(
     define_flags: defines flags that depend on other arguments; gets them with
       flagfiles expanded.
   """
+  signals.catch()
   for stream in (sys.stdout, sys.stderr):  # of any encoding
     if isinstance(stream, io.TextIOWrapper):
       stream.reconfigure(errors="backslashreplace")
@@ -53,7 +55,10 @@ def run(
   def guarded_main(argv: Sequence[str]) -> int | None:
     if len(argv) > 1:
       return _fail(f"unexpected argument {argv[1]!r}; flags start with --")
-    return guarded(main)
+    try:
+      return guarded(main)
+    finally:
+      signals.ignore()
 
   def parse(argv: Sequence[str]) -> list[str]:
     try:
@@ -97,6 +102,10 @@ def guarded(main: Callable[[], int | None]) -> int | None:
     return 1
   except OSError as error:
     return _fail(str(error))
+  except LostWorkerError as error:
+    is_own = "workers" in flags.FLAGS
+    flag = "--workers" if is_own else "--config.evaluation_workers"
+    return _fail(f"{error}; fewer processes need less: {flag}=1")
   except KeyboardInterrupt:
     print("\ninterrupted", file=sys.stderr)
     return INTERRUPTED

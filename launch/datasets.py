@@ -91,7 +91,14 @@ def _collect(config: RunConfig) -> None:
     return
   print(f"collecting demonstrations: {_command(config)}", flush=True)
   arguments = [sys.executable, str(_COLLECT), *_flags(config)]
-  if subprocess.run(arguments).returncode:
+  with subprocess.Popen(arguments) as process:
+    try:
+      status = process.wait()
+    except KeyboardInterrupt:  # `subprocess.run` would kill it
+      process.terminate()
+      process.wait()
+      raise
+  if status:
     raise UserError(f"{config.demonstrations} could not be collected")
 
 

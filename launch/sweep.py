@@ -16,6 +16,7 @@ same Python environment; a run whose node is lost is resumed on another.
 import collections
 import functools
 import pathlib
+import shlex
 import signal
 import time
 from collections.abc import Sequence
@@ -23,10 +24,10 @@ from collections.abc import Sequence
 from absl import flags, logging
 
 import lfgp_dmc
+from lfgp_dmc import signals
 from lfgp_dmc.launch import command, sweep_engines, sweep_jobs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.sweep_jobs import Job
-from lfgp_dmc.runs import signals
 
 _ALGORITHMS = flags.DEFINE_list("algorithms", ["lfgp"], "Names of flagfiles.")
 _MAIN_TASKS = flags.DEFINE_list(
@@ -74,7 +75,8 @@ def main() -> int:
   sweep_jobs.recall(jobs, runs / sweep_jobs.INDEX_NAME)
   if _DRY_RUN.value:
     for job in jobs:
-      print(f"{job.state:<12} {job.name:<32} {' '.join(job.train_arguments())}")
+      arguments = shlex.join(job.train_arguments())
+      print(f"{job.state:<12} {job.name:<32} {arguments}")
     print(_summary(jobs))
     return 0
   if all(job.state == sweep_jobs.MISSING for job in jobs):

@@ -8,6 +8,7 @@ import asyncio
 import os
 import pathlib
 import platform
+import shlex
 import signal
 import subprocess
 import sys
@@ -16,16 +17,11 @@ from typing import Any
 
 from absl import logging
 
+from lfgp_dmc.acting.workers import ONE_THREAD
 from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
 _CHILD = pathlib.Path(__file__).with_name("sweep_child.py")
-_VARIABLES = {
-  "OMP_NUM_THREADS": "1",
-  "MKL_NUM_THREADS": "1",
-  "OPENBLAS_NUM_THREADS": "1",
-  "OMP_WAIT_POLICY": "PASSIVE",
-}
 
 
 class LocalEngine:
@@ -158,7 +154,7 @@ def popen(
   with open(log, "a", encoding="utf-8") as output:
     # A killed attempt leaves the log within a line.
     lead = "\n" if output.tell() else ""
-    output.write(f"{lead}$ train.py {' '.join(arguments)}  # on {place}\n")
+    output.write(f"{lead}$ train.py {shlex.join(arguments)}  # on {place}\n")
     output.flush()
     python, starter = sys.executable, str(os.getpid())
     return subprocess.Popen(
@@ -166,6 +162,6 @@ def popen(
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,
-      env={**os.environ, **_VARIABLES},
+      env={**os.environ, **ONE_THREAD},
       start_new_session=True,
     )

@@ -72,7 +72,7 @@ def make_jobs(
   arguments: Sequence[str] = (),
   flags: pathlib.Path = FLAGS,
 ) -> list[Job]:
-  """Every algorithm on every main task, seed by seed.
+  """Every algorithm on every main task, seed by seed; each run once.
 
   Args:
     algorithms: names of flagfiles, such as lfgp or lfgp_play; with a task after
@@ -82,25 +82,34 @@ def make_jobs(
     runs: folder for the runs.
     arguments: more of `launch/train.py`; `{runs}` and `{seed}` are filled in.
     flags: folder of the flagfiles; jobs that find none are `MISSING`.
+
+  Raises:
+    ValueError: a name is empty, or a path.
   """
-  jobs = []
+  for name in (*algorithms, *main_tasks):
+    if not name or "/" in name:
+      raise ValueError(f"{name!r} is no name of a flagfile or a task")
+  jobs: dict[str, Job] = {}
   for seed in seeds:
     for algorithm in algorithms:
       stem, tasks = _split(algorithm, main_tasks)
       for main_task in tasks:
-        values = {"runs": runs, "seed": seed}
         job = Job(
           algorithm,
           main_task,
           seed,
           runs / f"{stem}_{main_task}_{seed}",
           flags / f"{stem}.flags",
-          tuple(argument.format(**values) for argument in arguments),
+          tuple(
+            # No format(): other braces are the argument's own.
+            argument.replace("{runs}", str(runs)).replace("{seed}", str(seed))
+            for argument in arguments
+          ),
         )
         if not job.flagfile.is_file():
           job.state = MISSING
-        jobs.append(job)
-  return jobs
+        jobs.setdefault(job.name, job)
+  return [*jobs.values()]
 
 
 def _split(

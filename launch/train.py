@@ -1,6 +1,6 @@
 """Trains an agent by a flagfile, and continues a run that was stopped.
 
-  python launch/train.py --flagfile=launch/flags/lfgp_stack.flags \
+  python launch/train.py --flagfile=launch/flags/lfgp.flags \
       --config.seed=1 --run=runs/stack_1
   python launch/train.py --run=runs/stack_1 --resume
 
@@ -40,7 +40,8 @@ def main() -> int:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
   progress = training.train(config, path, _RESUME.value)
-  training.draw(path)
+  if progress.is_complete:  # whoever stops a run waits
+    training.draw(path)
   return report(config, path, progress)
 
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import tqdm
 
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import transfer
 from lfgp_dmc.agents.lfgp.batch_maker import BatchMaker
@@ -127,11 +126,11 @@ class LfgpAgent:
       learner.prior.warn_if_precise(
         self.tasks, self._experts, learner.intentions.target_entropy
       )
-    for _ in tqdm.trange(
-      self._first_updates,
+    for _ in progress_bars.bar(
+      range(self._first_updates),
       desc="on the other run's replay",
       unit="update",
-      disable=not (progress_bar and self._first_updates),
+      show=progress_bar and self._first_updates > 0,
     ):
       self.update()
     self._has_started = True

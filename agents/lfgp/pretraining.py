@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-import tqdm
 
+from lfgp_dmc import progress_bars
 from lfgp_dmc.agents.cloning import IntentionCloner
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.fields import OptimiserConfig
@@ -40,12 +40,11 @@ class Pretraining:
       intentions, config.learning_rate, self.optimiser, config.loss, self.dtype
     )
     cloner.anneal(config.updates)
-    updates = tqdm.trange(
-      1,
-      config.updates + 1,
+    updates = progress_bars.bar(
+      range(1, config.updates + 1),
       desc="pretraining",
       unit="update",
-      disable=not progress_bar,
+      show=progress_bar,
     )
     for update in updates:
       metrics = cloner.update(experts.sample(generator, self.batch_size))

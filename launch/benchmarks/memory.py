@@ -6,9 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 import torch
-import tqdm
 
-from lfgp_dmc import observations
+from lfgp_dmc import observations, progress_bars
 from lfgp_dmc.agents import synthetic
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.benchmarks import learner
@@ -43,7 +42,8 @@ def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
     readings = [resident_gb()]
     yield "resident_gb/0", readings[0]
     part = max(1, updates // _READINGS)
-    for update in tqdm.trange(1, updates + 1, unit="update", mininterval=1.0):
+    counted = range(1, updates + 1)
+    for update in progress_bars.bar(counted, desc="memory", unit="update"):
       agent.update()
       if update % part == 0:
         readings.append(resident_gb())
@@ -62,6 +62,7 @@ def _fill(replay: Replay) -> None:
   rows = synthetic.transitions(
     _CHUNK, observations.OBSERVATION_SIZE, _ACTION_SIZE
   )
-  for start in tqdm.trange(0, replay.capacity, _CHUNK, desc="filling"):
+  starts = range(0, replay.capacity, _CHUNK)
+  for start in progress_bars.bar(starts, desc="filling", unit="chunk"):
     count = min(_CHUNK, replay.capacity - start)
     replay.add_batch(type(rows)(*(np.asarray(part)[:count] for part in rows)))

@@ -3,10 +3,9 @@
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-import tqdm
 
 import lfgp_dmc
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.acting import environments
 
 _HELD = 0.1  # chance of a new action, in every other episode
@@ -49,7 +48,7 @@ def _play(task: str, steps: int, seed: int) -> dict[str, float]:
   speed = 0.0
   timestep = environment.reset()
   action, change = np.zeros(4, np.float32), 1.0
-  for step in tqdm.trange(steps, desc=task, unit="step", mininterval=1.0):
+  for step in progress_bars.bar(range(steps), desc=task, unit="step"):
     if random.random() < change:
       action = random.uniform(-1, 1, 4).astype(np.float32)
     timestep = environment.step(action)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import tqdm
 
+from lfgp_dmc import progress_bars
 from lfgp_dmc.acting import workers as work
 from lfgp_dmc.acting.attempts import Attempt, CollectionPlan, Collector, Job
 from lfgp_dmc.data.demonstration_checks import COLLECTIONS
@@ -76,9 +77,8 @@ def collect(
       )
   shape = plan.frame_shape
   piles = {task: _Pile(task, pairs, finals, shape) for task in tasks}
-  with tqdm.tqdm(
-    total=(pairs + finals) * len(piles), unit="pair", disable=not progress
-  ) as bar:
+  total = (pairs + finals) * len(piles)
+  with progress_bars.bar(total=total, unit="pair", show=progress) as bar:
     units: list[str | None] = [None] if collection == "play" else [*piles]
     _fill(plan, piles, units, workers, bar)
   return {task: pile.collected() for task, pile in piles.items()}
@@ -98,7 +98,7 @@ def _fill(
   with contextlib.closing(results):
     for unit in units:
       wanted = piles if unit is None else {unit: piles[unit]}
-      bar.set_description(unit or "play")
+      bar.set_description_str(unit or "play")
       while not all(pile.is_full for pile in wanted.values()):
         of_unit, attempts = next(results)
         if of_unit != unit:  # begun before it was full

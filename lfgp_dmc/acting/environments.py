@@ -7,6 +7,7 @@ tasks (`success/`, `condition/`, `reward/`) is never an input. Agents act in
 [-1, 1]: see `with_unit_actions`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -191,14 +192,16 @@ def reseeded(
 
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
-  """The sizes (O, A) of flat observations and of actions."""
+  """The sizes (O, A) of flat observations without pixels, and of actions."""
   flatten, spec = flattener(environment), environment.observation_spec()
   if isinstance(spec, Mapping):
     example: Any = {name: np.zeros(part.shape) for name, part in spec.items()}
   else:
     example = np.zeros(spec.shape)
   action_size = int(np.prod(environment.action_spec().shape))
-  return len(flatten(example)), action_size
+  pixels = frame_shape(environment)
+  size = len(flatten(example)) - (math.prod(pixels) if pixels else 0)
+  return size, action_size
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:

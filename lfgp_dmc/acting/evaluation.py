@@ -9,10 +9,9 @@ import functools
 from collections.abc import Callable, Sequence
 
 import dm_env
-import tqdm
 from absl import logging
 
-from lfgp_dmc import seeding
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.acting import workers as work
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
@@ -43,6 +42,9 @@ def evaluate(
     progress: whether to show a bar.
     env_step: goes into the rows, which come task by task.
     draws: whether the environment makes pictures.
+
+  Raises:
+    LostWorkerError: see `workers.ordered`.
   """
   jobs = [(task, i) for task in tasks for i in range(episodes)]
   workers = max(1, min(workers, len(jobs)))
@@ -50,12 +52,12 @@ def evaluate(
     _Player, make_environment, make_actor, seed, env_step
   )
   results = work.ordered(make_player, jobs, workers, draws)
-  bar = tqdm.tqdm(
+  bar = progress_bars.bar(
     results,
     total=len(jobs),
     desc="evaluating",
     unit="episode",
-    disable=not progress,
+    show=progress,
     leave=False,
   )
   with contextlib.closing(results):

@@ -8,13 +8,16 @@ import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+import traceback
+from collections.abc import Callable, Generator, Iterable, Iterator
+from multiprocessing import resource_tracker
 from typing import Any
 
-from lfgp_dmc import graphics
+from lfgp_dmc import graphics, signals
 
-# Set before a worker imports anything.
-_VARIABLES = {
+MakeState = Callable[[], Callable[[Any], Any]]
+
+ONE_THREAD = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
   "OPENBLAS_NUM_THREADS": "1",
@@ -23,8 +26,12 @@ _VARIABLES = {
 }
 
 
+class LostWorkerError(RuntimeError):
+  """A worker process died without an answer."""
+
+
 def ordered(
-  make_state: Callable[[], Callable[[Any], Any]],
+  make_state: MakeState,
   jobs: Iterable[Any],
   workers: int,
   draws: bool = False,
@@ -37,8 +44,12 @@ def ordered(
       be picklable, and so must jobs and results.
     jobs: finite or endless: a few are in flight, and closing the generator
       ends the processes.
-    workers: processes; 1 works in this one.
+    workers: processes; 1 works in this one. They get no signals: what is sent
+      to all of a job is this process's to handle.
     draws: whether they make pictures.
+
+  Raises:
+    LostWorkerError: a process was killed. What a job raises is raised as it is.
   """
   if workers == 1:
     state = make_state()
@@ -51,41 +62,86 @@ def ordered(
   if draws:
     graphics.allow_pictures()
   jobs = iter(jobs)
-  with _variables({} if draws else {"MUJOCO_GL": "off"}):
-    pool = concurrent.futures.ProcessPoolExecutor(
-      workers,
-      mp_context=multiprocessing.get_context("spawn"),
-      initializer=_start,
-      initargs=(make_state,),
+  crew: list[_Worker] = []
+  threads = concurrent.futures.ThreadPoolExecutor(workers)  # each waits for one
+  try:
+    resource_tracker.ensure_running()  # its start lets signals through again
+    with signals.held(), _variables(draws):
+      for _ in range(workers):
+        crew.append(_Worker(make_state))
+    idle = collections.deque(crew)
+
+    def do(job: Any) -> Any:
+      worker = idle.popleft()
+      try:
+        return worker.do(job)
+      finally:
+        idle.append(worker)
+
+    flying = collections.deque(
+      threads.submit(do, job) for job in itertools.islice(jobs, 2 * workers)
     )
-    try:
-      flying = collections.deque(
-        pool.submit(_work, job) for job in itertools.islice(jobs, 2 * workers)
+    while flying:
+      result = flying.popleft().result()
+      flying.extend(
+        threads.submit(do, job) for job in itertools.islice(jobs, 1)
       )
-      while flying:
-        result = flying.popleft().result()
-        flying.extend(
-          pool.submit(_work, job) for job in itertools.islice(jobs, 1)
-        )
-        yield result
-    finally:
-      pool.shutdown(cancel_futures=True)
+      yield result
+  finally:
+    with signals.held():
+      for worker in crew:
+        worker.kill()
+      threads.shutdown(cancel_futures=True)
 
 
-_state: Callable[[Any], Any] | None = None  # one in each worker process
+class _Worker:
+  """A process that does one job at a time."""
+
+  def __init__(self, make_state: MakeState):
+    context = multiprocessing.get_context("spawn")
+    self._connection, theirs = context.Pipe()
+    self._process = context.Process(target=_serve, args=(make_state, theirs))
+    self._process.start()
+    theirs.close()  # so that we read its end
+
+  def do(self, job: Any) -> Any:
+    """Does a job."""
+    try:
+      self._connection.send(job)
+      is_done, result = self._connection.recv()
+    except (EOFError, OSError):
+      raise LostWorkerError(self._fate()) from None
+    if not is_done:
+      raise result
+    return result
+
+  def kill(self) -> None:
+    """Ends the process, idle or busy."""
+    self._process.kill()
+    self._process.join()
+
+  def _fate(self) -> str:
+    self._process.join()
+    status = self._process.exitcode
+    if status == -signal.SIGKILL:
+      return "a worker process was killed, as by the kernel out of memory"
+    return f"a worker process ended with exit status {status}"
 
 
-def _start(make_state: Callable[[], Callable[[Any], Any]]) -> None:
-  """Initialises a worker: it ignores SIGINT and exits with its parent."""
-  global _state
-  signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _serve(make_state: MakeState, connection: Any) -> None:
+  """Does jobs until the parent ends."""
   threading.Thread(target=_end_with_parent, daemon=True).start()
-  _state = make_state()
-
-
-def _work(job: Any) -> Any:
-  assert _state is not None
-  return _state(job)
+  state = None
+  with contextlib.suppress(EOFError, OSError):
+    while True:
+      job = connection.recv()
+      try:
+        state = make_state() if state is None else state
+        answer = True, state(job)
+      except Exception as error:  # the parent raises it
+        error.add_note(f"in a worker process:\n{traceback.format_exc()}")
+        answer = False, error
+      connection.send(answer)
 
 
 def _end_with_parent() -> None:
@@ -96,20 +152,17 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def _variables(more: Mapping[str, str]) -> Iterator[None]:
+def _variables(draws: bool) -> Iterator[None]:
   """Sets the variables that spawned processes inherit, then restores ours.
 
-  A worker's initializer would set them too late: unpickling its arguments
-  imports.
+  Later would be too late: what the processes unpickle first imports.
   """
-  ours = {**_VARIABLES, **more}
-  before = {name: os.environ.get(name) for name in ours}
-  os.environ.update(ours)
+  before = dict(os.environ)
+  os.environ.update(ONE_THREAD)
+  if not draws:
+    os.environ["MUJOCO_GL"] = "off"
   try:
     yield
   finally:
-    for name, value in before.items():
-      if value is None:
-        del os.environ[name]
-      else:
-        os.environ[name] = value
+    os.environ.clear()
+    os.environ.update(before)

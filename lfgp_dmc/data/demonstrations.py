@@ -5,7 +5,7 @@
 row belongs to, never decreasing), `is_last` bool [N] (the row of success; an
 attempt cut by the exact count has none), and the attributes `schema_version`,
 `task`, `main_task`, `collection`, `expert`, `seed`, `control_hz`. Your own
-arrays become such a file by `write("stack.hdf5", Demonstrations(...), {...})`.
+attempts become such a file by `write("stack.hdf5", from_attempts(...), {...})`.
 
 With pixels (version 2), an observation is what a robot senses, and `frames`
 uint8 [N + E, C, H, W, 3] holds those of each row, and after an episode's last
@@ -18,7 +18,7 @@ import io
 import os
 import pathlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import h5py
@@ -68,6 +68,38 @@ class Demonstrations:
     return np.arange(len(self)) + np.cumsum(begins)
 
 
+def from_attempts(
+  attempts: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]],
+  attributes: Mapping[str, Any] | None = None,
+) -> Demonstrations:
+  """Makes pairs of attempts; what was recorded after success is left out.
+
+  Args:
+    attempts: of each T + 1 states, [T + 1, O]; T actions, [T, A]; and whether
+      each action led to success, bool [T].
+    attributes: see `write`.
+
+  Raises:
+    DatasetError: there is no attempt.
+  """
+  parts = []
+  for number, (states, actions, succeeded) in enumerate(attempts):
+    steps = min(len(actions), int(np.argmax([*succeeded, True])) + 1)
+    episode, after = np.full(steps, number), states[1 : steps + 1]
+    parts.append(
+      (states[:steps], actions[:steps], after, episode, succeeded[:steps])
+    )
+  if not parts:
+    raise DatasetError("there is no attempt")
+  arrays = {
+    name: np.concatenate(part).astype(dtype)
+    for (name, dtype), part in zip(
+      checks.DTYPES.items(), zip(*parts, strict=True), strict=True
+    )
+  }
+  return Demonstrations(**arrays, attributes=attributes or {})
+
+
 def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
   """Writes a new dataset folder, a file a task: all of them or nothing.
 
@@ -101,7 +133,7 @@ def write(
   """Writes one task's file: checked first, then whole or not at all.
 
   Args:
-    path: `<dataset>/<task>.hdf5`, in a folder that exists.
+    path: `<dataset>/<task>.hdf5`.
     demonstrations: of the task.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed`,
       `control_hz`; None takes the demonstrations' own. `schema_version` is
@@ -125,6 +157,7 @@ def write(
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
+  path.parent.mkdir(parents=True, exist_ok=True)
   content = io.BytesIO()  # HDF5 has no OSError for a full disk
   with h5py.File(content, "w") as file:
     for name, array in arrays.items():
@@ -203,29 +236,6 @@ def read_folder(
       "\n".join([f"the dataset {folder} cannot be used:", *damaged, *missing])
     )
   return found
-
-
-def summary_table(demonstrations: Mapping[str, Demonstrations]) -> str:
-  """A plain-text table of what a dataset holds, one row a task.
-
-  Columns: pairs, episodes, mean and longest episode in steps, share of rows
-  that are an episode's success, mean |a|, share of action values beyond 0.95,
-  and the share of rows that have the commonest gripper value (last action).
-  """
-  rows = [
-    f"{'task':<16}{'pairs':>8}{'episodes':>10}{'mean len':>10}{'longest':>9}"
-    f"{'is_last':>9}{'mean |a|':>10}{'> 0.95':>8}{'gripper':>9}"
-  ]
-  for task, data in demonstrations.items():
-    lengths = np.unique(data.episode, return_counts=True)[1]
-    gripper = np.unique(data.action[:, -1], return_counts=True)[1]
-    size = np.abs(data.action)
-    rows.append(
-      f"{task:<16}{len(data):>8}{len(lengths):>10}{lengths.mean():>10.1f}"
-      f"{lengths.max():>9}{data.is_last.mean():>9.2%}{size.mean():>10.3f}"
-      f"{(size > 0.95).mean():>8.1%}{gripper.max() / len(data):>9.2%}"
-    )
-  return "\n".join(rows)
 
 
 def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:

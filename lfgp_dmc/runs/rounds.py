@@ -5,11 +5,12 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, TypeVar
 
-import tqdm
+from absl import logging
 
+from lfgp_dmc import progress_bars, signals
+from lfgp_dmc.acting.workers import LostWorkerError
 from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
-from lfgp_dmc.runs.signals import stop_request
 from lfgp_dmc.types import Agent, Metrics
 
 EvaluateFn = Callable[[int], Mapping[str, float]]
@@ -20,8 +21,8 @@ _Agent = TypeVar("_Agent", bound=Agent)
 class Rounds(abc.ABC, Generic[_Agent]):
   """Trains by rounds, an episode or an epoch each, until the run's end.
 
-  Evaluations and checkpoints fall on ends of rounds. SIGINT or SIGTERM finishes
-  the round and writes a checkpoint, without rows or an evaluation that were not
+  Evaluations and checkpoints fall on ends of rounds. A signal finishes the
+  round, not an evaluation, and writes a checkpoint, without rows that were not
   due, so that the resumed run equals one never stopped.
   """
 
@@ -50,34 +51,67 @@ class Rounds(abc.ABC, Generic[_Agent]):
     """Trains to the end, or to a signal; returns how far it came.
 
     Args:
-      evaluate_fn: env_step -> success rate by task; writes its own rows.
+      evaluate_fn: env_step -> success rate by task; writes its own rows, whole
+        or torn by a signal.
       checkpoint_fn: stores the agent, its data and the progress it is given.
+
+    Raises:
+      LostWorkerError: in an evaluation; a checkpoint was written.
     """
+    self._functions = evaluate_fn, checkpoint_fn
     schedule, progress = self._schedule, self.progress
     progress.is_complete |= progress.env_step >= schedule.env_steps
-    self._bar = tqdm.tqdm(
+    progress.evaluation_due |= schedule.evaluate_first and not progress.env_step
+    self._bar = progress_bars.bar(
       total=schedule.env_steps,
       initial=progress.env_step,
+      desc="training",
       unit=self._unit,
-      disable=not schedule.progress_bar,
+      show=schedule.progress_bar,
       mininterval=1.0,
     )
-    with self._bar, stop_request() as stop:
-      self._begin()
-      if schedule.evaluate_first and evaluate_fn and not progress.env_step:
-        self._evaluate(evaluate_fn)
+    with self._bar, signals.stop_request() as stop:
+      try:
+        with stop.at_once():
+          self._begin()
+      except signals.StopError:
+        logging.warning("stopped before the first step: nothing is stored")
+        return progress
+      if progress.evaluation_due or stop:
+        self._close_round(progress.is_complete, stop)
       while not progress.is_complete and not stop:
         before = progress.env_step
         self._round()
         step, final = progress.env_step, progress.is_complete
         due = final or passed(before, step, schedule.evaluate_every)
-        if due and evaluate_fn:
-          self._evaluate(evaluate_fn)
+        progress.evaluation_due = due
         due = final or passed(before, step, schedule.checkpoint_every)
-        if (due or stop) and checkpoint_fn:
-          progress.wall_s = self._elapsed()
-          checkpoint_fn(progress)
+        self._close_round(due, stop)
+    progress.is_complete &= not progress.evaluation_due
     return progress
+
+  def _close_round(self, is_due: bool, stop: signals.StopRequest) -> None:
+    """Evaluates and writes a checkpoint, if due.
+
+    An evaluation that a stop or a lost process ends is left to a resumed run.
+    """
+    evaluate_fn, checkpoint_fn = self._functions
+    progress, lost = self.progress, None
+    try:
+      if progress.evaluation_due and evaluate_fn:
+        with stop.at_once():
+          rates = evaluate_fn(progress.env_step)
+        self._show_success(rates)
+      progress.evaluation_due = False
+    except signals.StopError:
+      pass
+    except LostWorkerError as error:
+      lost = error
+    if (is_due or stop or lost) and checkpoint_fn:
+      progress.wall_s = self._elapsed()
+      checkpoint_fn(progress)
+    if lost and not stop:
+      raise lost
 
   def _begin(self) -> None:
     """Work before the first round, if any."""
@@ -106,8 +140,7 @@ class Rounds(abc.ABC, Generic[_Agent]):
     self._log.write({**row, **metrics})
     return metrics
 
-  def _evaluate(self, evaluate_fn: EvaluateFn) -> None:
-    rates = evaluate_fn(self.progress.env_step)
+  def _show_success(self, rates: Mapping[str, float]) -> None:
     self._log.write_scalars(
       self.progress.env_step,
       {f"success/{task}": rate for task, rate in rates.items()},

@@ -116,6 +116,8 @@ class Run:
   def _evaluate(self, env_step: int) -> dict[str, float]:
     self._save_policy(env_step)
     rows = self._evaluate_policy(env_step)
+    # Rows may be there of a kill between here and the checkpoint.
+    csv_files.truncate_after(self._folder.evaluation, env_step - 1)
     evaluation_csv.append_csv(self._folder.evaluation, rows)
     return evaluation_csv.success_rates(rows)
 

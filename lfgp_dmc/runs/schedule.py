@@ -41,3 +41,4 @@ class Progress:
   wall_s: float = 0.0
   update_credit: float = 0.0  # the fraction of an update that is due
   is_complete: bool = False  # reached its end, which may come early in BC
+  evaluation_due: bool = False  # at this step, and not made yet

@@ -2,10 +2,6 @@
 
 import os
 import pathlib
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 
@@ -16,7 +12,6 @@ from tests import fixtures as shared
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
-_SCRIPT = str(_ROOT / "launch" / "collect_demonstrations.py")
 
 
 class CollectDemonstrationsTest(shared.FolderTest):
@@ -68,22 +63,3 @@ class CollectDemonstrationsTest(shared.FolderTest):
     refused = self._call(f"{line} --task=insert", status=1)
     self.assertIn("cannot do insert, bring of --task=insert; it can do: stack",
                   refused.stderr)  # fmt: skip
-
-  def test_an_interrupt_leaves_nothing(self):
-    line = "--task=stack --pairs_per_task=90000 --workers=2 --output=new"
-    running = subprocess.Popen(
-      [sys.executable, _SCRIPT, *line.split()],
-      cwd=self.folder,
-      stderr=subprocess.PIPE,
-      text=True,
-      # A shell's background job ignores SIGINT, and so would all it starts.
-      preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
-    assert running.stderr is not None
-    self.assertNotEmpty(running.stderr.read(20))  # the bar: it has begun
-    time.sleep(2)
-    running.send_signal(signal.SIGINT)
-    _, errors = running.communicate(timeout=60)
-    self.assertEqual(running.returncode, command.INTERRUPTED, errors)
-    self.assertNotIn("Traceback", errors)
-    self.assertEmpty(os.listdir(self.folder))

@@ -66,6 +66,21 @@ class SweepTest(FolderTest):
       jobs[names.index("lfgp_stack_7")].train_arguments(),
     )  # fmt: skip
 
+  def test_repeats_run_once_and_foreign_braces_stay(self):
+    given = ["--a={task}", "--b={}", "--c={", "--d={seed}{runs.name}"]
+    jobs = self._jobs(("lfgp", "lfgp_stack"), (0, 0), arguments=given)
+    self.assertEqual(
+      [job.name for job in jobs], ["lfgp_stack_0", "lfgp_bring_0"]
+    )
+    self.assertEqual(jobs[0].arguments, (*given[:3], "--d=0{runs.name}"))
+    states = self._run(jobs, FakeEngine({}))
+    self.assertEqual({*states.values()}, {"done"})
+
+  def test_names_that_are_none_are_refused(self):
+    for bad in ("", "../lfgp"):
+      with self.assertRaisesRegex(ValueError, f"'{bad}' is no name"):
+        self._jobs((bad,))
+
   def test_what_died_is_tried_again_and_bad_input_is_not(self):
     jobs = self._jobs(("lfgp", "dac"), (0, 1))
     engine = FakeEngine(

@@ -1,18 +1,27 @@
 """A run from its config to its files, continued, and refused."""
 
 import shutil
+import signal
 from unittest import mock
 
 import numpy as np
 from absl.testing import parameterized
 
 import lfgp_dmc
+from lfgp_dmc.acting import evaluation
+from lfgp_dmc.agents import cloning
 from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run, run_folder
 from lfgp_dmc.runs.schedule import Progress
 from tests import fixtures as shared
 from tests.launch import fixtures
+
+_WARM_START = {
+  "env_steps": 60,
+  "agent.pretraining.updates": 5,
+  "agent.networks.actor_trunk": "own",
+}
 
 
 class TrainingTest(fixtures.RunTest):
@@ -31,6 +40,42 @@ class TrainingTest(fixtures.RunTest):
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
+
+  @parameterized.parameters(1, 5)  # episodes: of the first, of the last one
+  def test_a_stop_in_an_evaluation_changes_no_number(self, episodes):
+    config = self.config(evaluate_first=True, **_WARM_START)
+    whole, _ = self.train(config, "whole")
+    real, played = evaluation._Player.__call__, []
+
+    def play_and_stop(player, job):
+      played.append(job)
+      if len(played) == episodes:
+        signal.raise_signal(signal.SIGTERM)
+      return real(player, job)
+
+    with mock.patch.object(evaluation._Player, "__call__", play_and_stop):
+      path, progress = self.train(config, "stopped")
+    self.assertLen(played, episodes)
+    self.assertFalse(progress.is_complete)
+    newest = max((path / "checkpoints").iterdir()).name
+    self.assertEqual(int(newest), progress.env_step)
+    _, resumed = self.train(config, "stopped", resume=True)
+    self.assertTrue(resumed.is_complete)
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
+
+  def _stop(self, *arguments):
+    signal.raise_signal(signal.SIGTERM)
+    self.fail("it went on")
+
+  def test_a_stop_in_the_warm_start_starts_anew(self):
+    config = self.config(**_WARM_START)
+    whole, _ = self.train(config, "whole")
+    with mock.patch.object(cloning.IntentionCloner, "update", self._stop):
+      path, progress = self.train(config, "stopped")
+    self.assertEqual(progress.update, 0)
+    self.assertFalse((path / "checkpoints").exists())
+    self.train(config, "stopped", resume=True)
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_another_config_is_not_resumed(self):
     self.train(self.config(env_steps=40))

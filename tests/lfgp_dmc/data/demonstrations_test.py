@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 from absl.testing import parameterized
 
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import demonstration_summary, demonstrations
 from lfgp_dmc.data.demonstrations import DatasetError
 from tests import fixtures
 
@@ -191,7 +191,7 @@ class DemonstrationsTest(fixtures.FolderTest):
       demonstrations.read_folder(self.folder / "none", ("reach",))
 
   def test_summary(self):
-    table = demonstrations.summary_table({"reach": _DATA})
+    table = demonstration_summary.table({"reach": _DATA})
     header, row = table.splitlines()
-    self.assertIn("episodes", header)
-    self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])
+    self.assertIn("attempts success median most", header)
+    self.assertEqual(row.split()[:6], ["reach", "6", "2", "1", "3", "3"])

@@ -2,10 +2,13 @@
 
 import os
 import signal
+from unittest import mock
 
 import numpy as np
+from absl.testing import parameterized
 
-from lfgp_dmc import toy
+from lfgp_dmc import signals, toy
+from lfgp_dmc.acting import workers
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop
@@ -41,10 +44,11 @@ class _Agent(fixtures.ToyAgent):
     self.episodes.append(episode)
 
 
-class LoopTest(fixtures.FolderTest):
+class LoopTest(fixtures.FolderTest, parameterized.TestCase):
   def setUp(self):
     super().setUp()
     self._evaluated, self._saved = [], []
+    self._on_evaluation = None
 
   def _train(self, agent, environment=None, progress=None, **schedule):
     options = {
@@ -65,9 +69,15 @@ class LoopTest(fixtures.FolderTest):
       progress,
     )
     return rounds.run(
-      lambda step: self._evaluated.append(step) or {"right": 0.5},
+      self._evaluate,
       lambda at: self._saved.append((at.env_step, at.update)),
     )
+
+  def _evaluate(self, step):
+    self._evaluated.append(step)
+    if self._on_evaluation:
+      self._on_evaluation()
+    return {"right": 0.5}
 
   def _rows(self):
     return csv_files.read(self.folder / "metrics.csv")[1]
@@ -152,6 +162,77 @@ class LoopTest(fixtures.FolderTest):
     progress = self._train(_Agent(), progress=progress, checkpoint_every=1000)
     self.assertEqual((progress.env_step, progress.episodes), (100, 5))
     self.assertEqual([step for step, _ in self._saved], [40, 100])
+
+  def test_a_repeat_is_the_same_request_and_a_later_signal_is_not(self):
+    with signals.stop_request() as stop, self.assertLogs(level="WARNING"):
+      for number in (signal.SIGTERM, signal.SIGHUP, signal.SIGINT):
+        signal.raise_signal(number)
+      self.assertTrue(stop)
+      with (
+        mock.patch.object(signals, "_REPEAT", 0.0),
+        self.assertRaises(KeyboardInterrupt),
+      ):
+        signal.raise_signal(signal.SIGTERM)
+
+  def test_nohup_holds(self):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    self.addCleanup(signal.signal, signal.SIGHUP, before)
+    with signals.stop_request() as stop:
+      signal.raise_signal(signal.SIGHUP)
+    self.assertFalse(stop)
+
+  @parameterized.parameters(0, 60, 100)
+  def test_a_stop_in_an_evaluation_leaves_it_to_the_resumed_run(self, at):
+    def stop_once():
+      if self._evaluated[-1] == at:
+        self._on_evaluation = None
+        signal.raise_signal(signal.SIGTERM)
+
+    schedule = {"evaluate_first": True, "checkpoint_every": 1000}
+    self._on_evaluation = stop_once
+    with self.assertLogs(level="WARNING"):
+      progress = self._train(_Agent(), **schedule)
+    self.assertEqual(self._saved[-1][0], at)
+    self.assertTrue(progress.evaluation_due)
+    self.assertFalse(progress.is_complete)
+    self.assertEqual(self._evaluated[-1], at)
+    progress = self._train(_Agent(), progress=progress, **schedule)
+    self.assertTrue(progress.is_complete)
+    self.assertEqual(self._saved[-1][0], 100)
+    self.assertEqual(self._evaluated, sorted([0, 60, 100, at]))
+
+  def test_a_lost_worker_leads_to_a_checkpoint_and_is_reported(self):
+    def lose():
+      raise workers.LostWorkerError("killed")
+
+    self._on_evaluation = lose
+    with self.assertRaisesRegex(workers.LostWorkerError, "killed"):
+      self._train(_Agent(), checkpoint_every=1000)
+    self.assertEqual([step for step, _ in self._saved], [60])
+
+  def test_a_lost_worker_after_a_stop_is_no_fault(self):
+    def stop_and_lose():
+      signal.raise_signal(signal.SIGTERM)
+      raise workers.LostWorkerError("killed")
+
+    self._on_evaluation = stop_and_lose
+    with self.assertLogs(level="WARNING"):
+      progress = self._train(_Agent(), checkpoint_every=1000)
+    self.assertEqual([step for step, _ in self._saved], [60])
+    self.assertTrue(progress.evaluation_due)
+
+  def test_a_stop_before_the_first_step_says_that_nothing_is_stored(self):
+    agent = _Agent()
+
+    def prepare(progress_bar):
+      signal.raise_signal(signal.SIGINT)
+
+    agent.prepare = prepare
+    with self.assertLogs(level="WARNING") as logs:
+      progress = self._train(agent, evaluate_first=True)
+    self.assertIn("nothing is stored", logs.output[-1])
+    self.assertEqual((progress.env_step, self._saved), (0, []))
+    self.assertEqual(self._evaluated, [])
 
   def test_a_finished_run_is_left_alone(self):
     self._train(_Agent(), progress=Progress(env_step=100))

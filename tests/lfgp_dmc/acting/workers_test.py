@@ -1,0 +1,78 @@
+"""Work shared among processes: order, faults, signals, and what is left."""
+
+import multiprocessing
+import os
+import signal
+import time
+from unittest import mock
+
+from absl.testing import absltest
+
+from lfgp_dmc.acting import workers
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+class _Player:
+  """Does a job: squares it, raises, waits or dies."""
+
+  def __call__(self, job):
+    if job == "fail":
+      raise ValueError("no such job")
+    if job == "wait":
+      time.sleep(60)
+    if job == "die":
+      os.kill(os.getpid(), signal.SIGKILL)
+    return job * job
+
+
+class WorkersTest(absltest.TestCase):
+  def tearDown(self):
+    self.assertEmpty(multiprocessing.active_children())
+    super().tearDown()
+
+  def test_results_come_in_order_whatever_signals_all_processes_get(self):
+    real = workers._Worker.do
+
+    def do_after_signals(worker, job):
+      for number in _SIGNALS:  # the first ones before its imports
+        os.kill(worker._process.pid, number)
+      return real(worker, job)
+
+    handlers = [signal.getsignal(number) for number in _SIGNALS]
+    with mock.patch.object(workers._Worker, "do", do_after_signals):
+      results = workers.ordered(_Player, iter(range(40)), 2)
+      self.assertEqual([*results], [n * n for n in range(40)])
+    self.assertEqual([signal.getsignal(n) for n in _SIGNALS], handlers)
+    self.assertEmpty(signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+  def test_faults_are_raised_here(self):
+    with self.assertRaisesRegex(ValueError, "no such job") as raised:
+      list(workers.ordered(_Player, [1, "fail", 2], 2))
+    self.assertIn("in __call__", raised.exception.__notes__[0])
+    with self.assertRaisesRegex(
+      workers.LostWorkerError, "was killed, as by the kernel"
+    ):
+      list(workers.ordered(_Player, [1, "die", 2], 2))
+
+  def test_closing_ends_busy_workers_at_once(self):
+    results = workers.ordered(_Player, [1, "wait", "wait", "wait"], 2)
+    self.assertEqual(next(results), 1)
+    start = time.monotonic()
+    results.close()
+    self.assertLess(time.monotonic() - start, 2)
+
+  def test_an_interrupt_leaves_no_process(self):
+    def interrupt(number, frame):
+      signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    self.addCleanup(signal.signal, signal.SIGINT, before)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    self.addCleanup(signal.signal, signal.SIGALRM, before)
+    for delay in (1e-6, 0.003, 0.01, 0.1):  # while they start, and later
+      with self.assertRaises(KeyboardInterrupt):
+        signal.setitimer(signal.ITIMER_REAL, delay)
+        list(workers.ordered(_Player, [1, "wait", "wait"], 2))
+      self.assertEmpty(multiprocessing.active_children())
+      self.assertEmpty(signal.pthread_sigmask(signal.SIG_BLOCK, ()))
