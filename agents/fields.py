@@ -7,6 +7,7 @@ where it is declared.
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeVar, dataclass_transform
 
+import numpy as np
 import pydantic
 import pydantic.dataclasses
 from pydantic import AfterValidator, ConfigDict, Field
@@ -64,6 +65,28 @@ def _fault(fault: Any, values: Mapping[str, Any], prefix: str) -> str:
       tag, tags = fault["ctx"]["tag"], fault["ctx"]["expected_tags"]
       return f"{name}.kind is {tag!r}; valid: {tags}"
   return f"{name} is {fault['input']!r}; valid: {says}"
+
+
+def check_arrays(
+  arrays: Mapping[str, np.ndarray],
+  shapes: Mapping[str, tuple[int, ...]],
+  what: str,
+) -> None:
+  """Checks that stored arrays are those of these names and shapes, and finite.
+
+  Raises:
+    ValueError: the message starts with `what` and lists each fault.
+  """
+  found = [f"{name} is missing" for name in shapes if name not in arrays]
+  found += [f"{name} is not known" for name in arrays if name not in shapes]
+  for name, shape in shapes.items():
+    array = arrays.get(name)
+    if array is not None and tuple(array.shape) != shape:
+      found.append(f"{name} has shape {list(array.shape)}, not {list(shape)}")
+    elif array is not None and not np.isfinite(array).all():
+      found.append(f"{name} holds numbers that are not finite")
+  if found:
+    raise ValueError(f"{what}: {'; '.join(found)}")
 
 
 def positions(slices: str) -> tuple[int, ...]:

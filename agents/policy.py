@@ -1,6 +1,11 @@
-"""A stored policy, and the one implementation of acting with intentions."""
+"""A stored policy, and the one implementation of acting with intentions.
+
+In NumPy: a product of one row takes no library of networks, and what acts
+starts at once, wherever it runs.
+"""
 
 import dataclasses
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,17 +13,18 @@ from typing import Annotated, Any
 
 import numpy as np
 import pydantic
-import torch
 from pydantic import Field
 
-from lfgp_dmc.agents import fields, serialisation
+from lfgp_dmc.agents import fields, vision
 from lfgp_dmc.agents.fields import NetworksConfig
-from lfgp_dmc.agents.networks import layouts
-from lfgp_dmc.agents.networks.encoder import Encoder
-from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
-from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
+
+_MEAN, _STD = "standardiser.mean", "standardiser.deviation"
+_HEADS, _OUTPUT = "heads.", "heads.output"
+_SECOND = "heads.second"  # of the layout without a trunk
+# With ReLU, in order, those that there are.
+_HIDDEN = ("trunk.first", "trunk.second", "heads.hidden", _SECOND)
 
 
 @fields.checked
@@ -38,27 +44,50 @@ class PolicyOptions(NetworksConfig):
   channels: fields.Count = 0
   env_step: fields.Count = 0  # how long it was trained
 
+  def shapes(self) -> dict[str, tuple[int, ...]]:
+    """Of the arrays by name: a network's own."""
+    size, hidden, tasks = self.observation_size, self.hidden_size, self.tasks
+    inputs = size * (2 if self.tanh_feature_scale else 1)
+    shapes: dict[str, tuple[int, ...]] = {_MEAN: (size,), _STD: (size,)}
+    widths = {"heads.hidden": inputs, _SECOND: hidden}
+    if self.layout == "shared_trunk":
+      for name, width in (("trunk.first", inputs), ("trunk.second", hidden)):
+        shapes |= {f"{name}.weight": (hidden, width), f"{name}.bias": (hidden,)}
+      widths = {"heads.hidden": hidden}
+    for name, width in (*widths.items(), (_OUTPUT, hidden)):
+      out = 2 * self.action_size if name == _OUTPUT else hidden
+      shapes[f"{name}.weight"] = (len(tasks), width, out)
+      shapes[f"{name}.bias"] = (len(tasks), 1, out)
+    if self.frame_shape:
+      shapes |= vision.shapes(self.frame_shape, self.features, self.channels)
+    return shapes
+
 
 class Policy:
   """Intentions by task name: observation in, action out.
 
   Also an `lfgp_dmc.types.Actor`: `begin(task, seed)`, then `act(observation)`.
+
+  Attributes:
+    tasks: the intentions' names.
+    deterministic: whether `act` takes tanh(mean), or a sample, by default.
+    frame_shape: [C, H, W, 3] of what it sees; empty if it has no encoder.
   """
 
   def __init__(
     self,
-    network: IntentionNetwork,
+    arrays: Mapping[str, np.ndarray],
     tasks: Sequence[str],
-    deterministic: bool = True,
+    tanh_feature_scale: float = 0.0,
+    frame_shape: Sequence[int] = (),
   ):
-    """Wraps a network, which may go on being trained.
-
-    `deterministic`: whether `act` takes tanh(mean), or a sample, by default.
-    """
+    """Takes arrays by their names in stored policies."""
     self.tasks = tuple(tasks)
-    self.deterministic = deterministic
-    self._network = network
-    self._device = network.standardiser.mean.device
+    self.deterministic = True
+    self.frame_shape = tuple(frame_shape)
+    self._arrays = arrays
+    self._scale = tanh_feature_scale
+    self._hidden = [name for name in _HIDDEN if f"{name}.weight" in arrays]
     self._task = self.tasks[0]
     self._generator = np.random.default_rng(0)
 
@@ -66,7 +95,7 @@ class Policy:
   def from_arrays(
     cls, arrays: Mapping[str, np.ndarray], options: Mapping[str, Any]
   ) -> "Policy":
-    """Builds, on the CPU, what another's `arrays` and `options` returned.
+    """Builds what another's `arrays` and `options` returned.
 
     Raises:
       ValueError: an option is missing or wrong, or the arrays do not fit;
@@ -77,26 +106,10 @@ class Policy:
     except pydantic.ValidationError as error:
       faults = fields.faults(error, options, POLICY_FIELD)
       raise ValueError("; ".join(faults)) from None
-    encoder, unused = None, torch.Generator()
-    if checked.frame_shape:
-      encoder = Encoder(
-        checked.observation_size - checked.features,
-        checked.frame_shape,
-        checked.features,
-        checked.channels,
-        unused,
-      )
-    network = layouts.make_intentions(
-      checked.layout,
-      Standardiser(checked.observation_size, checked.tanh_feature_scale),
-      len(checked.tasks),
-      checked.hidden_size,
-      checked.action_size,
-      unused,
-      encoder=encoder,
-    )
-    serialisation.load_module_state(network, arrays, "policy arrays")
-    return cls(network.requires_grad_(False), checked.tasks)
+    fields.check_arrays(arrays, checked.shapes(), "policy arrays")
+    single = {name: np.asarray(a, np.float32) for name, a in arrays.items()}
+    scale, shape = checked.tanh_feature_scale, checked.frame_shape
+    return Policy(single, checked.tasks, scale, shape)
 
   @classmethod
   def load(cls, folder: str | os.PathLike[str]) -> "Policy":
@@ -122,7 +135,7 @@ class Policy:
     arrays = array_files.read(arrays_path)
     try:
       return cls.from_arrays(arrays, options)
-    except (ValueError, RuntimeError) as error:  # torch: too large
+    except ValueError as error:
       raise ValueError(f"{arrays_path}: {error}") from error
 
   def save(
@@ -145,36 +158,32 @@ class Policy:
 
   def arrays(self) -> dict[str, np.ndarray]:
     """Everything acting needs, by name, copied."""
-    return serialisation.module_state(self._network)
+    return {name: np.array(array) for name, array in self._arrays.items()}
 
   def options(self) -> dict[str, Any]:
     """The JSON-able options that `from_arrays` takes beside the arrays."""
-    network, encoder = self._network, self.encoder
+    shapes = {name: array.shape for name, array in self._arrays.items()}
+    is_separate = f"{_SECOND}.weight" in shapes
     seen = {}
-    if encoder is not None:
+    if self.frame_shape:
       seen = {
-        "frame_shape": list(encoder.frame_shape),
-        "features": encoder.features,
-        "channels": encoder.channels,
+        "frame_shape": list(self.frame_shape),
+        "features": shapes["encoder.output.weight"][0],
+        "channels": shapes["encoder.sharpness"][0],
       }
     return seen | {
       "tasks": list(self.tasks),
-      "observation_size": network.standardiser.mean.shape[0],
+      "observation_size": shapes[_MEAN][0],
       "action_size": self.action_size,
-      "hidden_size": network.heads.output.weight.shape[1],
-      "layout": layouts.layout_of(network.heads),
-      "tanh_feature_scale": network.standardiser.tanh_feature_scale,
+      "hidden_size": shapes[f"{_OUTPUT}.weight"][1],
+      "layout": "separate" if is_separate else "shared_trunk",
+      "tanh_feature_scale": self._scale,
     }
-
-  @property
-  def encoder(self) -> Encoder | None:
-    """What turns frames into features, if it acts from pixels."""
-    return self._network.encoder
 
   @property
   def action_size(self) -> int:
     """A, floats of an action."""
-    return self._network.heads.output.weight.shape[-1] // 2
+    return self._arrays[f"{_OUTPUT}.weight"].shape[-1] // 2
 
   def begin(self, task: str, seed: int) -> None:
     """Starts an attempt at `task`; samples follow from `seed`.
@@ -207,31 +216,51 @@ class Policy:
     index = self._index(self._task if task is None else task)
     if deterministic is None:
       deterministic = self.deterministic
-    with torch.inference_mode():
-      raw = torch.as_tensor(
-        observation, dtype=torch.float32, device=self._device
+    raw = np.asarray(observation, np.float32)
+    width = self._arrays[_MEAN].shape[0]
+    encodes = bool(self.frame_shape) and raw.shape[-1:] != (width,)
+    if encodes:
+      own = width - len(self._read("encoder.output.bias"))
+      width = own + math.prod(self.frame_shape)
+    if raw.ndim not in (1, 2) or raw.shape[-1] != width:
+      raise ValueError(
+        f"observation has shape {raw.shape}; valid: ({width},) or (B, {width})"
       )
-      network = self._network
-      width = network.standardiser.mean.shape[0]
-      rows = raw if raw.dim() > 1 else raw[None]
-      encoder = network.encoder
-      if encoder is not None and rows.shape[-1] != width:
-        width = encoder.observation_size
-      if raw.dim() not in (1, 2) or rows.shape[-1] != width:
-        raise ValueError(
-          f"observation has shape {tuple(raw.shape)}; valid: ({width},) or "
-          f"(B, {width})"
-        )
-      if encoder is not None and width == encoder.observation_size:
-        rows = encoder.observe(rows)
-      inputs = network.standardiser(rows)
-      mean, std = network.heads.one(network.trunk(inputs), index)
-      if not deterministic:
-        source = self._generator if generator is None else generator
-        noise = source.standard_normal(mean.shape, np.float32)
-        mean = mean + to_std(std) * torch.from_numpy(noise).to(self._device)
-      action = torch.tanh(mean).cpu().numpy()
-    return action if raw.dim() > 1 else action[0]
+    rows = np.atleast_2d(raw)
+    if encodes:
+      features = self.encode(rows[:, own:].reshape(-1, *self.frame_shape))
+      rows = np.hstack([rows[:, :own], features])
+    mean, std = np.split(self._gaussian(rows, index), 2, axis=-1)
+    if not deterministic:
+      source = self._generator if generator is None else generator
+      noise = source.standard_normal(mean.shape, np.float32)
+      mean = mean + (np.logaddexp(0, std) + 1e-7) * noise
+    action = np.tanh(mean)
+    return action if raw.ndim > 1 else action[0]
+
+  def encode(self, frames: np.ndarray) -> np.ndarray:
+    """Features, float32 [N, F], of frames [N, C, H, W, 3], 0 to 255."""
+    return vision.encode(self._read, frames)
+
+  def _gaussian(self, raw: np.ndarray, index: int) -> np.ndarray:
+    """Mean and raw std before the tanh, [B, 2A], for observations [B, O]."""
+    rows = (raw - self._read(_MEAN, index)) / self._read(_STD, index)
+    if self._scale:
+      rows = np.concatenate([rows, np.tanh(raw / self._scale)], axis=-1)
+    for name in self._hidden:
+      rows = np.maximum(self._linear(name, rows, index), 0)
+    return self._linear(_OUTPUT, rows, index)
+
+  def _linear(self, name: str, rows: np.ndarray, index: int) -> np.ndarray:
+    weight = self._read(f"{name}.weight", index)
+    if not name.startswith(_HEADS):  # torch's own layers are [outputs, inputs]
+      weight = weight.T
+    return rows @ weight + self._read(f"{name}.bias", index)
+
+  def _read(self, name: str, index: int = 0) -> np.ndarray:
+    """An array, or a task's part of those that differ by task."""
+    array = self._arrays[name]
+    return array[index] if name.startswith(_HEADS) else array
 
   def _index(self, task: str) -> int:
     if task not in self.tasks:

@@ -4,7 +4,6 @@ import dataclasses
 import functools
 import os
 import pathlib
-from collections.abc import Callable
 from typing import NamedTuple
 
 import dm_env
@@ -62,16 +61,16 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   found = datasets.load(config, tasks, widths, shape)
   if not shape or ALGORITHMS[config.algorithm].is_supervised:
     return Parts(environment, tasks, widths, found, device, shape)
-  encoder = _encoder_of(config, folder)
-  encode = encoders.as_function(encoder)
-  environment = environments.with_features(environment, encode)
-  found = {task: _with_features(data, encode) for task, data in found.items()}
+  clone = _clone_of(config, folder)
+  environment = environments.with_features(environment, clone.encode)
+  found = {task: _with_features(data, clone) for task, data in found.items()}
   widths = environments.widths(environment)
+  encoder = encoders.frozen(clone)
   return Parts(environment, tasks, widths, found, device, shape, encoder)
 
 
-def _encoder_of(config: RunConfig, folder: pathlib.Path | None) -> Encoder:
-  """The frozen encoder of the run, or of the clone that it starts from."""
+def _clone_of(config: RunConfig, folder: pathlib.Path | None) -> Policy:
+  """Whose encoder is used: the run's own policy, or what it starts from."""
   if not config.init_from:
     raise UserError(
       "config.init_from is not set: from pixels, give the folder of a clone, "
@@ -82,18 +81,16 @@ def _encoder_of(config: RunConfig, folder: pathlib.Path | None) -> Encoder:
   if folder is not None and (folder / run_folder.ARRAYS_NAME).exists():
     source = folder
   with command.checked_input():
-    encoder = Policy.load(source).encoder
-  if encoder is None:
+    policy = Policy.load(source)
+  if not policy.frame_shape:
     raise UserError(f"config.init_from: {config.init_from} sees no pixels")
-  return encoder
+  return policy
 
 
-def _with_features(
-  data: Demonstrations, encode: Callable[[np.ndarray], np.ndarray]
-) -> Demonstrations:
+def _with_features(data: Demonstrations, clone: Policy) -> Demonstrations:
   """Demonstrations with features in the place of frames."""
   assert data.frames is not None, "they were checked"
-  features, rows = encode(data.frames), data.frame_rows()
+  features, rows = clone.encode(data.frames), data.frame_rows()
   return dataclasses.replace(
     data,
     observation=np.hstack([data.observation, features[rows]]),

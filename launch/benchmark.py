@@ -3,6 +3,7 @@
 python launch/benchmark.py --what=environment
 python launch/benchmark.py --what=learner --preset=fast
 python launch/benchmark.py --what=training --preset=fast
+python launch/benchmark.py --what=acting --config.main_task=insert
 python launch/benchmark.py --what=memory --steps=20000
 python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
@@ -23,6 +24,7 @@ _DEFAULT_STEPS = {
   "environment": 7_200,
   "learner": 0,  # it is timed instead
   "training": 1_000,
+  "acting": 50,
   "memory": 20_000,
   "stability": 200_000,
 }
@@ -34,6 +36,7 @@ _WHAT = flags.DEFINE_enum(
   "environment: control steps a second through dm_env, the physics' alone, a "
   "reset's time. learner: updates a second, against "
   "matrix products. training: the whole loop, against the learner alone. "
+  "acting: evaluation and collection. "
   "memory: with a full replay on disk. stability: random steps that count NaN, "
   "MuJoCo's warnings and lost blocks.",
 )
@@ -41,7 +44,8 @@ _STEPS = flags.DEFINE_integer(
   "steps",
   0,
   "Control steps; default: 7200 (environment), 1000 (training), 200000 a task "
-  "(stability); of memory: updates, default 20000.",
+  "(stability); of memory: updates, default 20000; of acting: episodes an "
+  "intention, default 50.",
   lower_bound=0,
 )
 _TASKS = flags.DEFINE_list(
@@ -82,6 +86,7 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
     "environment": (steps, seed),
     "learner": (config, seconds),
     "training": (config, steps, seconds),
+    "acting": (config, steps),
     "memory": (config, steps),
     "stability": (_TASKS.value, steps, seed),
   }

@@ -12,7 +12,7 @@ from typing import TypeVar
 from absl import app, flags
 from absl import logging as absl_logging
 
-from lfgp_dmc import graphics, signals
+from lfgp_dmc import graphics, signals, threads
 from lfgp_dmc.acting.workers import LostWorkerError
 
 _T = TypeVar("_T", str, int)
@@ -42,6 +42,7 @@ def run(
       flagfiles expanded.
   """
   signals.catch()
+  threads.wait_passively()
   for stream in (sys.stdout, sys.stderr):  # of any encoding
     if isinstance(stream, io.TextIOWrapper):
       stream.reconfigure(errors="backslashreplace")

@@ -23,7 +23,7 @@ from lfgp_dmc import graphics, seeding, task_names
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
-from lfgp_dmc.launch import command, config_flags, policies, training
+from lfgp_dmc.launch import command, config_flags, policies
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
@@ -57,6 +57,8 @@ def main() -> int:
     path = run_folder.default_path("quickstart", config.main_task)
   stored = _stored_policy(config.main_task)
   print(f"training {config.algorithm} on {config.main_task} in {path}")
+  from lfgp_dmc.launch import training  # loads torch: not for --help
+
   progress = training.train(config, path)
   figure = training.draw(path)
   if not progress.is_complete:
@@ -100,6 +102,8 @@ def _columns(
   config: RunConfig, path: pathlib.Path, stored: policies.PolicySpec | None
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
+  from lfgp_dmc.launch import training
+
   rows = evaluation_csv.read_csv(path / "evaluation.csv")
   tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:

@@ -46,11 +46,8 @@ def scripted_expert(control_hz: int = 20) -> Actor:
 
 def stored_policy(folder: str) -> Actor:
   """Reads the policy of a run or policy folder."""
-  import torch
-
   from lfgp_dmc.agents.policy import Policy
 
-  torch.set_num_threads(1)  # one row at a time: threads only get in the way
   return Policy.load(folder)
 
 

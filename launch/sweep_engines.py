@@ -17,7 +17,7 @@ from typing import Any
 
 from absl import logging
 
-from lfgp_dmc.acting.workers import ONE_THREAD
+from lfgp_dmc import threads
 from lfgp_dmc.launch.command import UserError
 
 _TRAIN = pathlib.Path(__file__).with_name("train.py")
@@ -162,6 +162,6 @@ def popen(
       stdin=subprocess.DEVNULL,
       stdout=output,
       stderr=subprocess.STDOUT,
-      env={**os.environ, **ONE_THREAD},
+      env={**os.environ, **threads.ONE},
       start_new_session=True,
     )

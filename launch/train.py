@@ -16,7 +16,7 @@ import shlex
 from absl import flags
 
 from lfgp_dmc.data import evaluation_csv
-from lfgp_dmc.launch import command, config_flags, configs, training
+from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.schedule import Progress
@@ -39,6 +39,8 @@ def main() -> int:
   if not _RUN.value:
     path = run_folder.default_path(config.algorithm, config.main_task)
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
+  from lfgp_dmc.launch import training  # loads torch: not for --help
+
   progress = training.train(config, path, _RESUME.value)
   if progress.is_complete:  # whoever stops a run waits
     training.draw(path)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from absl import logging
 
-from lfgp_dmc.agents.lfgp import LfgpAgent
+from lfgp_dmc.agents.lfgp.agent import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstration_checks import FRAMES

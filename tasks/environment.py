@@ -23,9 +23,11 @@ class _OncePerStepUpdater(observation.Updater):
   """
 
   def reset(self, physics, random_state):
-    super().reset(physics, random_state)
     enabled = {k: v for k, v in self._observables.items() if v.enabled}
     self._is_plain = all(map(_is_plain, enabled.values()))
+    specified = self._enabled_structure or {}
+    if not self._is_plain or enabled.keys() != specified.keys():
+      super().reset(physics, random_state)  # buffers; the spec is made of them
     self._readers = {
       name: value.observation_callable(physics, random_state)
       for name, value in enabled.items()

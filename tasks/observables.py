@@ -43,9 +43,9 @@ def make(
 
   for name, component in OBSERVATION_SLICES.items():
     is_hidden = shown == "vision" and component.privileged
-    add(name, _published(published, name), not is_hidden)
+    add(name, _Published(published, name), not is_hidden)
   for name in _FLAGS:
-    add(name, _published(published, name), True)
+    add(name, _Published(published, name), True)
   for name in GOALS:
     reward = observable.Generic(functools.partial(read_reward, name))
     add(REWARD_PREFIX + name, reward, show_rewards)
@@ -55,8 +55,15 @@ def make(
   return made
 
 
-def _published(published, name: str) -> observable.Observable:
-  return observable.Generic(lambda physics: published[name])
+class _Published(observable.Generic):
+  """Read from what the task publishes, by the fastest call there is."""
+
+  def __init__(self, published: Mapping[str, np.ndarray], name: str):
+    super().__init__(lambda physics: published[name])
+    self._read = functools.partial(published.__getitem__, name)
+
+  def _callable(self, physics):
+    return self._read
 
 
 def flags(

@@ -91,8 +91,7 @@ class PlayTask(composer.Task):
       where = self._spawn, self._goal.start, wanted
       initialisers.place_all(physics, random_state, self.world, *where)
       if request is None:
-        for _ in range(_SETTLE_STEPS):
-          physics.step()
+        physics.step(_SETTLE_STEPS)
       physics.data.time = 0.0
       self._begin(physics)
       if request is not None or self._is_fair(physics):

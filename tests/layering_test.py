@@ -17,6 +17,11 @@ _FORBIDDEN = {
   "launch": set(),
 }
 # Parts of the import name `lfgp_dmc` that are rooms of their own.
+_COMMANDS = [
+  path.stem
+  for path in sorted((_ROOT / "launch").glob("*.py"))
+  if "\ncli = " in path.read_text(encoding="utf-8")
+]
 _PARTS = [[room] for room in _FORBIDDEN if room != "lfgp_dmc"]
 
 
@@ -82,7 +87,13 @@ class LayeringTest(parameterized.TestCase):
       {"torch", *_SIMULATOR},
     ),
     ("lfgp_dmc.tasks.environment", {"torch"}),
-    ("lfgp_dmc.launch.train", {"matplotlib"}),  # it would slow the start
+    ("lfgp_dmc.agents.policy", {"torch", *_SIMULATOR}),
+    ("lfgp_dmc", {"matplotlib", "scipy", "h5py", "pydantic"}),
+    *(  # as for --help
+      (f"lfgp_dmc.launch.{name}", {"torch", "scipy", *_SIMULATOR})
+      for name in _COMMANDS
+    ),
+    ("lfgp_dmc.launch.train", {"matplotlib", "tensorboard", "h5py"}),
   )
   def test_importing_does_not_load(self, modules, heavy):
     code = (

@@ -16,10 +16,10 @@ from lfgp_dmc.agents.bc.pixel_pairs import PixelPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
 from lfgp_dmc.agents.demonstration_pool import make_standardiser
 from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
-from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
@@ -50,7 +50,7 @@ class BcAgent:
     self._pairs = pairs
     self._shuffling = shuffling
     self._best = copy.deepcopy(network).requires_grad_(False)
-    self.policy = Policy(self._best, tasks)  # of the best weights so far
+    self.policy = NetworkPolicy(self._best, tasks)  # of the best weights so far
     self._cloner = IntentionCloner(
       network, config.learning_rate, config.optimiser, config.loss, dtype
     )
@@ -174,9 +174,8 @@ def build(
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   encoder, seen = None, config.encoder
   if frame_shape:
-    encoder = Encoder(
-      observation_size, frame_shape, seen.features, seen.channels, initial
-    ).to(device)
+    sizes = seen.features, seen.channels
+    encoder = Encoder(frame_shape, *sizes, initial).to(device)
   standardiser = make_standardiser(
     config.inputs,
     demonstrations,

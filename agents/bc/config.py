@@ -11,7 +11,7 @@ from lfgp_dmc.agents.fields import (
   ProperShare,
   checked,
 )
-from lfgp_dmc.agents.networks.encoder import EncoderConfig
+from lfgp_dmc.agents.vision import EncoderConfig
 
 
 @checked

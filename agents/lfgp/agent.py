@@ -15,6 +15,7 @@ from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.metric_names import SCALAR_METRICS, TASK_METRICS
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.metering import Meter
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.agents.schedulers import Scheduler, period_returns
 from lfgp_dmc.data import files
@@ -38,7 +39,7 @@ class LfgpAgent:
     self.tasks = tuple(tasks)
     self.learner = learner
     self.batches = batches
-    self.policy = Policy(learner.networks.intentions, tasks)
+    self.policy = NetworkPolicy(learner.networks.intentions, tasks)
     self._scheduler = scheduler
     self._pretraining = pretraining
     self._experts = experts

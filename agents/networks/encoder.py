@@ -6,29 +6,18 @@ picture's places, and its mean place is what goes on. Random shifts as in DrQ
 (Kostrikov et al., 2020).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
 
-from lfgp_dmc.agents.fields import Count, PositiveInt, checked
+from lfgp_dmc.agents import serialisation, vision
 from lfgp_dmc.agents.networks.linear import initialise_, make_linear
+from lfgp_dmc.agents.policy import Policy
 
-# Side of the kernel, stride of each layer.
-_LAYERS = ((5, 2), (3, 2), (3, 1))
-_ROWS = 256  # encoded at a time
 _SMALLEST = 32  # pixels a side, which leave the last layer 4 x 4 places
-
-
-@checked
-class EncoderConfig:
-  """How frames are seen; of no effect without cameras."""
-
-  features: PositiveInt = 64  # F
-  channels: PositiveInt = 32  # of each layer
-  shift: Count = 4  # pixels, at most, of random shifts in training
 
 
 class Encoder(nn.Module):
@@ -36,7 +25,6 @@ class Encoder(nn.Module):
 
   def __init__(
     self,
-    floats: int,
     frame_shape: Sequence[int],
     features: int,
     channels: int,
@@ -45,7 +33,6 @@ class Encoder(nn.Module):
     """Draws the weights, which the cameras share up to the keypoints.
 
     Args:
-      floats: of an observation, before the pixels.
       frame_shape: [C, H, W, 3].
       features: F.
       channels: of each convolution.
@@ -60,11 +47,10 @@ class Encoder(nn.Module):
         f"frames have shape {list(frame_shape)}; valid: sides of {_SMALLEST} "
         "pixels or more"
       )
-    self.floats, self.frame_shape = floats, tuple(frame_shape)
-    self.channels, self.features = channels, features
+    self.frame_shape = tuple(frame_shape)
     cameras, *sides, inputs = self.frame_shape
     self.layers = nn.ModuleList()
-    for kernel, stride in _LAYERS:
+    for kernel, stride in vision.LAYERS:
       self.layers.append(_conv(inputs, channels, kernel, stride, generator))
       inputs = channels
       sides = [(side - kernel) // stride + 1 for side in sides]
@@ -77,16 +63,6 @@ class Encoder(nn.Module):
     self.register_buffer("_places", grid.view(-1, 2), persistent=False)
     self._places: torch.Tensor  # [places, 2]
 
-  @property
-  def observation_size(self) -> int:
-    """Floats of a flat observation with its pixels."""
-    return self.floats + int(np.prod(self.frame_shape))
-
-  @property
-  def output_size(self) -> int:
-    """Floats of an observation with features instead."""
-    return self.floats + self.features
-
   def forward(self, frames: torch.Tensor) -> torch.Tensor:
     """Features [B, F] of frames [B, C, H, W, 3], 0 to 255, in their dtype."""
     _, height, width, _ = self.frame_shape
@@ -97,12 +73,6 @@ class Encoder(nn.Module):
     shares = (hidden.float().flatten(2) * self.sharpness).softmax(-1)
     keypoints = (shares @ self._places).view(len(frames), -1)
     return torch.tanh(self.norm(self.output(keypoints)))
-
-  def observe(self, flat: torch.Tensor) -> torch.Tensor:
-    """Observations with pixels [B, ...] -> with features [B, output_size]."""
-    own, pixels = flat.split((self.floats, flat.shape[1] - self.floats), 1)
-    frames = pixels.reshape(-1, *self.frame_shape)
-    return torch.cat([own, self(frames)], 1)
 
 
 class _Conv(nn.Conv2d):
@@ -144,18 +114,12 @@ def shifted(
   return moved.reshape(frames.shape)
 
 
-def as_function(encoder: Encoder) -> Callable[[np.ndarray], np.ndarray]:
-  """The frozen encoder: frames uint8 [N, C, H, W, 3] -> float32 [N, F]."""
-  encoder.requires_grad_(False)
-
-  def encode(frames: np.ndarray) -> np.ndarray:
-    device = encoder.output.weight.device
-    made = np.empty((len(frames), encoder.features), np.float32)
-    with torch.inference_mode():
-      for start in range(0, len(frames), _ROWS):
-        some = torch.from_numpy(np.array(frames[start : start + _ROWS]))
-        features = encoder(some.to(device).float())
-        made[start : start + _ROWS] = features.cpu().numpy()
-    return made
-
-  return encode
+def frozen(policy: Policy) -> Encoder:
+  """The encoder of a policy from pixels, which nothing trains."""
+  options, generator = policy.options(), torch.Generator()
+  sizes = options["features"], options["channels"]
+  encoder = Encoder(policy.frame_shape, *sizes, generator)
+  arrays = policy.arrays()
+  kept = {k: arrays[f"encoder.{k}"] for k in encoder.state_dict()}
+  serialisation.load_module_state(encoder, kept, "the policy's encoder")
+  return encoder.requires_grad_(False)

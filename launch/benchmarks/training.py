@@ -1,6 +1,8 @@
 """Speed of the whole loop, acting included, against the learner's alone."""
 
 import functools
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -30,9 +32,10 @@ def measure(
 
   Yields:
     `learner_updates_per_s_1thread`, `..._2threads`: of updates alone, before
-    the loop; `loop_threads`; `loop_steps_per_s` and `loop_updates_per_s`: of
-    the whole loop; `learner_updates_per_s`: of updates alone once more, after
-    it; `loop_fraction`: the loop's updates a second over the faster of these.
+    the loop, `..._beside_busy` another process; `loop_threads`;
+    `loop_steps_per_s` and `loop_updates_per_s`: of the whole loop;
+    `learner_updates_per_s`: of updates alone once more, after it;
+    `loop_fraction`: the loop's updates a second over the faster of these.
   """
   replay = Replay(steps + _EPISODE, observations.OBSERVATION_SIZE, _ACTION_SIZE)
   agent = learner.make_agent(config, replay)
@@ -42,11 +45,14 @@ def measure(
   rates = {}
   for threads in (1, 2):
     torch.set_num_threads(threads)
+    name = f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}"
     rates[threads] = learner.rate(agent.update, seconds)
-    yield (
-      f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}",
-      rates[threads],
-    )
+    yield name, rates[threads]
+    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
+      try:
+        yield f"{name}_beside_busy", learner.rate(agent.update, seconds)
+      finally:
+        busy.kill()
   threads = max(rates, key=rates.__getitem__)
   torch.set_num_threads(threads)
   yield "loop_threads", threads

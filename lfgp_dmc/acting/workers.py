@@ -13,17 +13,9 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from multiprocessing import resource_tracker
 from typing import Any
 
-from lfgp_dmc import graphics, signals
+from lfgp_dmc import graphics, signals, threads
 
 MakeState = Callable[[], Callable[[Any], Any]]
-
-ONE_THREAD = {
-  "OMP_NUM_THREADS": "1",
-  "MKL_NUM_THREADS": "1",
-  "OPENBLAS_NUM_THREADS": "1",
-  "OMP_WAIT_POLICY": "PASSIVE",
-  "LP_NUM_THREADS": "0",  # of Mesa's software GL
-}
 
 
 class LostWorkerError(RuntimeError):
@@ -158,7 +150,7 @@ def _variables(draws: bool) -> Iterator[None]:
   Later would be too late: what the processes unpickle first imports.
   """
   before = dict(os.environ)
-  os.environ.update(ONE_THREAD)
+  os.environ.update(threads.ONE)
   if not draws:
     os.environ["MUJOCO_GL"] = "off"
   try:

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import scipy.stats
 
 _TRIMMED = 0.25  # share cut from each end
 
@@ -34,6 +33,7 @@ def mean(scores: np.ndarray) -> Estimate:
 
 def interquartile_mean(scores: np.ndarray) -> Estimate:
   """Mean of the middle half of all runs and tasks, and its 95 % interval."""
+  import scipy.stats  # takes its time: not for --help
 
   def statistic(*tasks: np.ndarray, axis: int) -> np.ndarray:
     together = np.concatenate(tasks, axis=axis)
@@ -72,6 +72,8 @@ def probability_of_improvement(
 
 def share(value: float, episodes: int) -> Estimate:
   """A share of so many episodes, and Wilson's 95 % interval; [1] each."""
+  import scipy.stats
+
   found = scipy.stats.binomtest(round(value * episodes), episodes)
   low, high = found.proportion_ci(method="wilson")
   return Estimate(*np.array([[value], [low], [high]]))
@@ -90,6 +92,8 @@ def _bootstrap(statistic: Callable, *strata: np.ndarray) -> Estimate:
     statistic: a function of the strata and `axis=-1`, vectorised.
     *strata: float [T, runs] each; a single run has a band without height.
   """
+  import scipy.stats
+
   middle = statistic(*strata, axis=-1)
   if min(stratum.shape[-1] for stratum in strata) == 1:
     return Estimate(middle, middle, middle)

@@ -6,16 +6,25 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
-from lfgp_dmc.agents import bc
+from lfgp_dmc.agents import bc, serialisation, vision
 from lfgp_dmc.agents.networks import encoder as encoders
-from lfgp_dmc.agents.networks.encoder import Encoder, EncoderConfig
+from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.vision import EncoderConfig
 from tests import fixtures
 
 _SHAPE = (2, 32, 32, 3)
 
 
 def _encoder(channels: int = 4) -> Encoder:
-  return Encoder(5, _SHAPE, 6, channels, torch.Generator().manual_seed(0))
+  return Encoder(_SHAPE, 6, channels, torch.Generator().manual_seed(0))
+
+
+def _encode(encoder: Encoder, frames: np.ndarray) -> np.ndarray:
+  arrays = {
+    f"encoder.{name}": array
+    for name, array in serialisation.module_state(encoder).items()
+  }
+  return vision.encode(arrays.__getitem__, frames)
 
 
 def _dots(places) -> np.ndarray:
@@ -28,28 +37,38 @@ def _dots(places) -> np.ndarray:
 
 class EncoderTest(parameterized.TestCase):
   def test_features_are_bounded_and_follow_the_frames(self):
-    encode = encoders.as_function(_encoder())
-    features = encode(_dots([(4, 4), (4, 24), (24, 4), (4, 4)]))
+    frames = _dots([(4, 4), (4, 24), (24, 4), (4, 4)])
+    features = _encode(_encoder(), frames)
     self.assertEqual((features.shape, features.dtype), ((4, 6), np.float32))
     self.assertLessEqual(np.abs(features).max(), 1)
     np.testing.assert_array_equal(features[0], features[3])
     self.assertGreater(np.abs(features[0] - features[1]).max(), 0.01)
     self.assertGreater(np.abs(features[0] - features[2]).max(), 0.01)
 
-  def test_observations_with_pixels_become_observations_with_features(self):
-    encoder, frames = _encoder(), _dots([(4, 9)])
-    own = torch.arange(5.0)[None]
-    flat = torch.cat([own, torch.from_numpy(frames).view(1, -1).float()], 1)
-    self.assertEqual(flat.shape[1], encoder.observation_size)
-    seen = encoder.observe(flat)
-    self.assertEqual(seen.shape[1], encoder.output_size)
-    torch.testing.assert_close(seen[:, :5], own)
-    features = torch.from_numpy(encoders.as_function(encoder)(frames))
-    torch.testing.assert_close(seen[:, 5:], features)
+  def test_numpy_and_torch_make_the_same_features(self):
+    encoder = _encoder(8)
+    for parameter in encoder.parameters():
+      torch.nn.init.normal_(parameter, std=0.5)
+    frames = np.random.default_rng(0).integers(
+      256, size=(33, *_SHAPE), dtype=np.uint8
+    )
+    with torch.inference_mode():
+      theirs = encoder(torch.from_numpy(frames).float()).numpy()
+    ours = _encode(encoder, frames)
+    self.assertEqual(ours.dtype, np.float32)
+    np.testing.assert_allclose(ours, theirs, atol=1e-4)
+    np.testing.assert_array_equal(
+      _encode(encoder, frames[:17])[16:], ours[16:17]
+    )
+    shapes = vision.shapes(_SHAPE, 6, 8)
+    own = {
+      f"encoder.{k}": tuple(v.shape) for k, v in encoder.state_dict().items()
+    }
+    self.assertEqual(shapes, own)
 
   def test_too_small_frames_are_refused(self):
     with self.assertRaisesRegex(ValueError, "sides of 32 pixels or more"):
-      Encoder(5, (1, 31, 40, 3), 6, 4, torch.Generator())
+      Encoder((1, 31, 40, 3), 6, 4, torch.Generator())
 
   def test_shifts_move_every_frame_by_some_pixels_and_repeat_edges(self):
     frames = np.zeros((50, *_SHAPE), np.uint8)

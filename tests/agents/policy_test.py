@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
+from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
@@ -15,15 +16,18 @@ TASKS = ("main", "first")
 OBS, A, H = 5, 3, 8
 
 
-def _policy(layout="shared_trunk"):
+def _network(layout="shared_trunk"):
   generator = torch.Generator().manual_seed(0)
   standardiser = Standardiser(OBS)
   rows = np.random.default_rng(0).standard_normal((50, OBS))
   standardiser.fit(rows.astype(np.float32))
-  network = layouts.make_intentions(
+  return layouts.make_intentions(
     layout, standardiser, len(TASKS), H, A, generator
   )
-  return Policy(network, TASKS)
+
+
+def _policy(layout="shared_trunk"):
+  return NetworkPolicy(_network(layout), TASKS)
 
 
 def _observation(*shape):
@@ -71,6 +75,18 @@ class ActingTest(absltest.TestCase):
     many = policy.act(rows, generator=np.random.default_rng(0))
     mean = policy.act(row, deterministic=True)
     np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
+
+  def test_a_networks_policy_acts_by_its_parameters_of_the_moment(self):
+    network, row = _network(), _observation()
+    policy = NetworkPolicy(network, TASKS)
+    before = policy.act(row)
+    stored = Policy.from_arrays(policy.arrays(), policy.options())
+    with torch.no_grad():
+      network.heads.output.bias += 0.5
+    after = Policy.from_arrays(policy.arrays(), policy.options()).act(row)
+    np.testing.assert_array_equal(stored.act(row), before)
+    np.testing.assert_array_equal(policy.act(row), after)
+    self.assertTrue(np.all(after != before))
 
   def test_observations_of_another_width_are_refused(self):
     for shape in ((OBS + 1,), (2, OBS - 1), (), (1, 1, OBS)):

@@ -6,7 +6,7 @@ import numpy as np
 from absl.testing import parameterized
 
 import lfgp_dmc
-from lfgp_dmc.agents.bc import BcAgent
+from lfgp_dmc.agents.bc.agent import BcAgent
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder

@@ -175,6 +175,7 @@ class BlockRunTest(absltest.TestCase):
       f"training --steps=3 --seconds=0 {small}",
       f"learner --seconds=0 {small}",
       f"memory --steps=3 {small} --config.replay_capacity=2000",
+      "acting --steps=1 --config.main_task=lift",
     )
     names = [_names(self._call(f"benchmark.py --what={x}")) for x in lines]
     self.assertEqual(
@@ -198,6 +199,7 @@ class BlockRunTest(absltest.TestCase):
       names[3],
     )
     self.assertContainsSubset(["resident_gb/0", "resident_gb"], names[4])
+    self.assertContainsSubset(["evaluation_s", "collection_s"], names[5])
 
 
 def _names(done: subprocess.CompletedProcess) -> list[str]:
