@@ -134,6 +134,7 @@ class BcAgent:
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
     serialisation.load_module_state(self._network, state["network"], "network")
+    self._network.flat.refresh()
     serialisation.load_module_state(self._best, state["best"], "best network")
     self._cloner.load_state_dict(state["cloner"])
     self._meter.load_state_dict(state["meter"])
@@ -177,8 +178,9 @@ def build(
     action_size,
     initial,
   ).to(device)
+  dtype = torch.bfloat16 if bfloat16 else torch.float32
+  network.flatten(dtype)
   split, share = seeding.generator(seed, "split"), config.validation_share
   pairs = SplitPairs(demonstrations, tasks, standardiser, share, split)
   shuffling = seeding.generator(seed, "shuffling")
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
   return BcAgent(config, tasks, network, pairs, shuffling, dtype)

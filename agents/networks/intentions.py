@@ -6,6 +6,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from lfgp_dmc.agents.networks.flat import FlatModule
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
@@ -66,7 +67,7 @@ def to_std(raw: torch.Tensor) -> torch.Tensor:
   return functional.softplus(raw) + 1e-7
 
 
-class IntentionNetwork(nn.Module):
+class IntentionNetwork(FlatModule):
   """All that acting needs: standardisation, trunk, heads."""
 
   def __init__(
