@@ -1,4 +1,4 @@
-# make setup, demo, test, lint; each makes .venv first if it is out of date.
+# make setup, demo, test, lint, docs; each makes .venv first if it is out of date.
 #
 # PYTHON=...         interpreter of a new .venv: Python 3.11 or 3.12
 # TORCH_OPTIONS=...  for the pip that installs torch. Without any, you get the
@@ -13,7 +13,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || \
 	echo python3)
 TORCH_OPTIONS ?=
 
-.PHONY: setup demo test lint
+.PHONY: setup demo test lint docs
 
 setup: $(STAMP)
 
@@ -42,3 +42,10 @@ lint: setup
 	ln -s $(CURDIR)/lfgp_dmc/* $(addprefix $(CURDIR)/,agents launch tasks) \
 		$(LAID_OUT)
 	$(BIN)/mypy
+
+# The API pages: build/docs/index.html. The commands say --help.
+API := $(addprefix lfgp_dmc.,acting agents data gymnasium observations pictures \
+	runs study task_names tasks types)
+docs: setup
+	$(BIN)/python -W ignore -m pdoc --docformat google \
+		--output-directory build/docs lfgp_dmc $(API)

@@ -1,6 +1,6 @@
 """Trains an agent by a flagfile, and continues a run that was stopped.
 
-  python launch/train.py --flagfile=launch/flags/lfgp_stack.flags \
+  python launch/train.py --flagfile=launch/flags/lfgp.flags \
       --config.seed=1 --run=runs/stack_1
   python launch/train.py --run=runs/stack_1 --resume
 

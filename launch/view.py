@@ -4,9 +4,11 @@
   python launch/view.py --task=insert --expert=scripted
   python launch/view.py --run=runs/stack_1 --task=reach
 
-Without --run or --expert the arm holds still, to be looked at and pushed.
+With an actor, page down and page up switch to its next and last task. Without
+--run or --expert the arm holds still, to be looked at and pushed.
 """
 
+import collections
 import functools
 
 import numpy as np
@@ -45,22 +47,33 @@ def main() -> None:
 
 
 def _open(spec: policies.PolicySpec | None, task: str) -> None:
-  from dm_control import viewer
+  from dm_control.viewer import application, user_input
 
   where = spec.environment_spec if spec else EnvironmentSpec(task)
   environment = where.build(seed=_SEED.value)
+  app = application.Application(f"LfGP-DMC: {task}")
   policy = None
   if spec:
     actor, flatten = spec.make(), environments.flattener(environment)
+    tasks = collections.deque(spec.tasks)  # the first one acts
+    tasks.rotate(-tasks.index(task))
+
+    def switch(by: int) -> None:
+      tasks.rotate(-by)
+      actor.begin(tasks[0], _SEED.value)
+      app._window.set_title(f"LfGP-DMC: {tasks[0]}")
 
     def policy(timestep) -> np.ndarray:
       if timestep.first():
-        actor.begin(task, _SEED.value)
+        switch(0)
       return actor.act(flatten(timestep.observation))
 
+    # The viewer has no public way to bind keys.
+    app._input_map.bind(functools.partial(switch, 1), user_input.KEY_PAGE_DOWN)
+    app._input_map.bind(functools.partial(switch, -1), user_input.KEY_PAGE_UP)
   print("space starts and pauses, backspace resets, [ and ] change the camera,")
-  print("F1 shows all keys")
-  viewer.launch(environment, policy, title=f"LfGP-DMC: {task}")
+  print("page down and page up the actor's task; F1 shows all other keys")
+  app.launch(environment, policy)
 
 
 cli = functools.partial(command.run, main, window=True)

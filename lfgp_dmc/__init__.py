@@ -2,16 +2,20 @@
 
     import lfgp_dmc
     environment = lfgp_dmc.load("stack", seed=0)
-    act = lfgp_dmc.load_policy("runs/NAME", "stack")
+    policy = lfgp_dmc.load_policy("runs/NAME")
     timestep = environment.reset()
-    action = act(lfgp_dmc.flatten(timestep.observation))
+    action = policy(lfgp_dmc.flatten(timestep.observation))
+
+Names of tasks: `MAIN_TASKS` (4), `AUXILIARY_TASKS` (5), `ALL_TASKS` (both).
+`OBSERVATION_SIZE` is 59 floats; `OBSERVATION_SLICES` says where each component
+is in them, its unit (m, m/s, rad/s, ...; quaternions are w x y z), and whether
+it needs the simulator's state.
 
 This facade reaches `tasks` and `agents` inside its functions only: importing it
 loads neither a simulator nor torch.
 """
 
 import os
-from collections.abc import Callable
 from typing import Any
 
 import dm_env
@@ -32,6 +36,7 @@ __all__ = [
   "MAIN_TASKS",
   "OBSERVATION_SIZE",
   "OBSERVATION_SLICES",
+  "StoredPolicy",
   "conditions",
   "flatten",
   "load",
@@ -50,11 +55,14 @@ def load(
     task: a name in `ALL_TASKS`.
     seed: fixes everything random in the environment; None draws a fresh seed.
     **options: `reward` ("sparse" or "dense"), `observations` ("features" or
-      "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20),
+      "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20 Hz),
       `time_limit` (18.0 s), `show_rewards` (False); see `tasks.load`.
 
   Returns:
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
+    Actions are [4] in [-1, 1]: moves of the set-point along x, y, z (1 is 1 cm
+    in 50 ms), and the gripper (below 0 opens, above 0 closes). Observations are
+    a dictionary: `flatten`, `successes`, `conditions` read it.
 
   Raises:
     ValueError: an unknown task, option or value, with the valid ones; vision
@@ -65,10 +73,36 @@ def load(
   return tasks.load(task, seed=seed, **options)
 
 
+class StoredPolicy:
+  """A trained policy: called with an observation, one of its intentions acts.
+
+  Attributes:
+    intentions: their names, the main task's first.
+    intention: the name of the one that acts unless a call names another.
+  """
+
+  def __init__(self, policy: Any, intention: str):
+    """Wraps an `agents.policy.Policy`; `load_policy` does it."""
+    self._policy = policy
+    self.intentions: tuple[str, ...] = policy.tasks
+    self.intention = intention
+
+  def __call__(
+    self, observation: np.ndarray, intention: str | None = None
+  ) -> np.ndarray:
+    """The mean action: float32 [O] or [B, O] -> [A] or [B, A], in [-1, 1].
+
+    Raises:
+      ValueError: there is no such intention (the message lists them), or
+        observations have another width.
+    """
+    return self._policy.act(observation, intention or self.intention)
+
+
 def load_policy(
   run_folder: str | os.PathLike[str], task: str | None = None, seed: int = 0
-) -> Callable[[np.ndarray], np.ndarray]:
-  """Loads a trained intention as a plain function.
+) -> StoredPolicy:
+  """Loads a trained policy as a plain function.
 
   Args:
     run_folder: `runs/NAME`, or a policy folder (`config.json` and
@@ -77,11 +111,12 @@ def load_policy(
     seed: for policies that draw random numbers; mean actions draw none.
 
   Returns:
-    A callable from an observation, float32 [O], to an action, float32 [A].
+    A function from an observation, float32 [O], to an action, float32 [A].
 
   Raises:
-    ValueError: the folder holds no policy, or the policy has no intention of
-      that name; the message names the file, or lists the intentions.
+    FileNotFoundError: the folder holds no policy; the message names the file.
+    ValueError: a file is damaged, or the policy has no intention of that name;
+      the message names the file, or lists the intentions.
   """
   from lfgp_dmc.agents.policy import Policy
 
@@ -93,4 +128,4 @@ def load_policy(
       f"{', '.join(policy.tasks)}"
     )
   policy.begin(task, seed)
-  return policy.act
+  return StoredPolicy(policy, task)

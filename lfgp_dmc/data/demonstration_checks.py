@@ -1,9 +1,11 @@
-"""Checks of one file of demonstrations: each returns its faults, in words."""
+"""Checks of one file of demonstrations: each says in words what it finds."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+_FAINT = 0.2  # largest |a| that suggests another unit
 
 SCHEMA_VERSION = 1
 COLLECTIONS = ("reset", "play")
@@ -51,6 +53,32 @@ def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
     for name, (is_valid, valid) in _VALID.items()
     if not is_valid(attributes[name])
   ]
+
+
+def doubts(arrays: Mapping[str, np.ndarray]) -> list[str]:
+  """What is accepted of the five arrays but seldom meant."""
+  found = []
+  if not arrays["is_last"].any():
+    found.append("no row of success ('is_last')")
+  largest = np.abs(arrays["action"]).max(axis=0)
+  if (largest < _FAINT).any():
+    found.append(
+      f"|a| stays below {_FAINT} in dimension {np.argmin(largest)}: is the "
+      "action in units of its bound?"
+    )
+  if rows := jumps(arrays):
+    found.append(
+      f"{len(rows)} rows do not start where the row before ended, first row "
+      f"{rows[0]}"
+    )
+  return found
+
+
+def jumps(arrays: Mapping[str, np.ndarray]) -> list[int]:
+  """Rows that do not start where the row before, of their attempt, ended."""
+  same = arrays["episode"][1:] == arrays["episode"][:-1]
+  before, after = arrays["next_observation"][:-1], arrays["observation"][1:]
+  return list(1 + np.flatnonzero(same & (before != after).any(axis=1)))
 
 
 def _is_name(value: Any) -> bool:

@@ -5,7 +5,7 @@
 row belongs to, never decreasing), `is_last` bool [N] (the row of success; an
 attempt cut by the exact count has none), and the attributes `schema_version`,
 `task`, `main_task`, `collection`, `expert`, `seed`, `control_hz`. Your own
-arrays become such a file by `write("stack.hdf5", Demonstrations(...), {...})`.
+attempts become such a file by `write("stack.hdf5", from_attempts(...), {...})`.
 """
 
 import dataclasses
@@ -13,7 +13,7 @@ import io
 import os
 import pathlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import h5py
@@ -54,6 +54,38 @@ class Demonstrations:
     return Demonstrations(**cut, attributes=self.attributes)
 
 
+def from_attempts(
+  attempts: Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]],
+  attributes: Mapping[str, Any] | None = None,
+) -> Demonstrations:
+  """Makes pairs of attempts; what was recorded after success is left out.
+
+  Args:
+    attempts: of each T + 1 states, [T + 1, O]; T actions, [T, A]; and whether
+      each action led to success, bool [T].
+    attributes: see `write`.
+
+  Raises:
+    DatasetError: there is no attempt.
+  """
+  parts = []
+  for number, (states, actions, succeeded) in enumerate(attempts):
+    steps = min(len(actions), int(np.argmax([*succeeded, True])) + 1)
+    episode, after = np.full(steps, number), states[1 : steps + 1]
+    parts.append(
+      (states[:steps], actions[:steps], after, episode, succeeded[:steps])
+    )
+  if not parts:
+    raise DatasetError("there is no attempt")
+  arrays = {
+    name: np.concatenate(part).astype(dtype)
+    for (name, dtype), part in zip(
+      checks.DTYPES.items(), zip(*parts, strict=True), strict=True
+    )
+  }
+  return Demonstrations(**arrays, attributes=attributes or {})
+
+
 def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
   """Writes a new dataset folder, a file a task: all of them or nothing.
 
@@ -87,7 +119,7 @@ def write(
   """Writes one task's file: checked first, then whole or not at all.
 
   Args:
-    path: `<dataset>/<task>.hdf5`, in a folder that exists.
+    path: `<dataset>/<task>.hdf5`.
     demonstrations: of the task.
     attributes: `task`, `main_task`, `collection`, `expert`, `seed`,
       `control_hz`; None takes the demonstrations' own. `schema_version` is
@@ -109,6 +141,7 @@ def write(
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
+  path.parent.mkdir(parents=True, exist_ok=True)
   content = io.BytesIO()  # HDF5 has no OSError for a full disk
   with h5py.File(content, "w") as file:
     for name, array in arrays.items():
@@ -186,22 +219,21 @@ def read_folder(
 def summary_table(demonstrations: Mapping[str, Demonstrations]) -> str:
   """A plain-text table of what a dataset holds, one row a task.
 
-  Columns: pairs, episodes, mean and longest episode in steps, share of rows
-  that are an episode's success, mean |a|, share of action values beyond 0.95,
-  and the share of rows that have the commonest gripper value (last action).
+  Columns: pairs; attempts, and how many end in a row of success; the median and
+  the most steps of an attempt; the share of action values beyond 0.95; and the
+  least and the greatest value of each dimension of the action.
   """
   rows = [
-    f"{'task':<16}{'pairs':>8}{'episodes':>10}{'mean len':>10}{'longest':>9}"
-    f"{'is_last':>9}{'mean |a|':>10}{'> 0.95':>8}{'gripper':>9}"
+    f"{'task':<16}{'pairs':>7}{'attempts':>9}{'success':>8}{'median':>7}"
+    f"{'most':>5}{'|a|>.95':>8}  actions from:to"
   ]
   for task, data in demonstrations.items():
     lengths = np.unique(data.episode, return_counts=True)[1]
-    gripper = np.unique(data.action[:, -1], return_counts=True)[1]
-    size = np.abs(data.action)
+    ranges = [f"{a.min():.2f}:{a.max():.2f}" for a in data.action.T]
     rows.append(
-      f"{task:<16}{len(data):>8}{len(lengths):>10}{lengths.mean():>10.1f}"
-      f"{lengths.max():>9}{data.is_last.mean():>9.2%}{size.mean():>10.3f}"
-      f"{(size > 0.95).mean():>8.1%}{gripper.max() / len(data):>9.2%}"
+      f"{task:<16}{len(data):>7}{len(lengths):>9}{data.is_last.sum():>8}"
+      f"{np.median(lengths):>7g}{lengths.max():>5}"
+      f"{(np.abs(data.action) > 0.95).mean():>8.1%}  {' '.join(ranges)}"
     )
   return "\n".join(rows)
 

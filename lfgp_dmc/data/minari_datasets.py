@@ -20,7 +20,8 @@ from minari.dataset.minari_dataset import parse_dataset_id
 from minari.namespace import validate_namespace
 from minari.storage import get_dataset_path
 
-from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.demonstration_checks import jumps
+from lfgp_dmc.data.demonstrations import Demonstrations, from_attempts
 
 _KEY = "lfgp_dmc"  # of our attributes in Minari's metadata
 
@@ -63,13 +64,10 @@ def _check(data: Demonstrations, dataset_id: str) -> None:
   for place in (path, *(p for p in path.parents if (p / "data").exists())):
     if place.exists():
       raise ValueError(f"the Minari dataset {place} exists; choose another")
-  gaps = (data.episode[1:] == data.episode[:-1]) & np.any(
-    data.observation[1:] != data.next_observation[:-1], axis=1
-  )
-  if gaps.any():
+  if rows := jumps(data.arrays()):
     raise ValueError(
-      f"{dataset_id}: row {int(np.argmax(gaps)) + 1} does not start where the "
-      "row before ended; Minari keeps whole trajectories"
+      f"{dataset_id}: row {rows[0]} does not start where the row before ended; "
+      "Minari keeps whole trajectories"
     )
 
 
@@ -113,22 +111,9 @@ def from_minari(
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")
-  pairs = [
-    (one.observations[:-1], one.actions, one.observations[1:])
-    for one in episodes
-  ]
-  observation, action, after = (
-    np.concatenate(parts).astype(np.float32)
-    for parts in zip(*pairs, strict=True)
-  )
-  lengths = [len(one.actions) for one in episodes]
-  return Demonstrations(
-    observation,
-    action,
-    after,
-    episode=np.repeat(np.arange(len(episodes), dtype=np.int32), lengths),
-    is_last=np.concatenate([_success(one) for one in episodes]),
-    attributes={**json.loads(str(stored)), **(attributes or {})},
+  return from_attempts(
+    ((one.observations, one.actions, _success(one)) for one in episodes),
+    {**json.loads(str(stored)), **(attributes or {})},
   )
 
 

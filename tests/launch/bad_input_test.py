@@ -44,6 +44,13 @@ _BAD = (
   ("sweep.py --seeds=a", "--seeds: invalid literal"),
   ("sweep.py --algorithms=sorcery", "none of these runs has a flagfile"),
   ("sweep.py --start_from=a", "valid: TARGET:SOURCE"),
+  ("check_demonstrations.py", "--dataset is not set"),
+  ("check_demonstrations.py --dataset=no", "no dataset folder no"),
+  ("check_demonstrations.py --dataset=no --strip=a.gif", "valid: a new .png"),
+  (
+    "check_demonstrations.py --dataset=no --environment=no:thing",
+    "No module named 'no'",
+  ),
   ("demo.py --stored=missing", "no run folder missing"),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )

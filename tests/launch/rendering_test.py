@@ -4,7 +4,6 @@ import itertools
 import json
 import pathlib
 import subprocess
-import sys
 import unittest
 from unittest import mock
 
@@ -14,7 +13,6 @@ from absl.testing import absltest
 
 import lfgp_dmc
 from lfgp_dmc import graphics
-from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import clips, command, policies, view
 from lfgp_dmc.pictures import video
 from lfgp_dmc.pictures.recorder import Look
@@ -42,25 +40,42 @@ class PolicyTest(absltest.TestCase):
     with self.assertRaisesRegex(ValueError, "no intention 'insert'; it has"):
       lfgp_dmc.load_policy(_POLICY, "insert")
 
-  def test_acts_in_the_viewer_for_the_named_task(self):
-    reach = lfgp_dmc.load_policy(_POLICY, "reach")
+  def test_keys_of_the_viewer_switch_intentions(self):
+    from dm_control.viewer import application, user_input
 
-    def launch(environment, policy, title):
-      self.assertEqual(title, "LfGP-DMC: reach")
+    stored = lfgp_dmc.load_policy(_POLICY)
+    app, keys = mock.MagicMock(), {}
+    app._input_map.bind.side_effect = lambda act, key: keys.update({key: act})
+    shown = app._window.set_title
+
+    def launch(environment, policy):
       timestep = environment.reset()
-      for _ in range(3):
-        action = policy(timestep)
-        expected = reach(lfgp_dmc.flatten(timestep.observation))
-        np.testing.assert_array_equal(action, expected)
-        timestep = environment.step(action)
+      for key, task in (
+        (None, "reach"),
+        (user_input.KEY_PAGE_DOWN, "lift"),
+        (user_input.KEY_PAGE_UP, "reach"),
+        (user_input.KEY_PAGE_UP, "close_gripper"),
+      ):
+        if key:
+          keys[key]()
+          self.assertEqual(shown.call_args.args, (f"LfGP-DMC: {task}",))
+        expected = stored(lfgp_dmc.flatten(timestep.observation), task)
+        np.testing.assert_array_equal(policy(timestep), expected)
+        timestep = environment.step(expected)
+        self.assertFalse(timestep.first())
+      # A reset keeps the task.
+      policy(environment.reset())
+      np.testing.assert_array_equal(
+        policy(timestep), stored(lfgp_dmc.flatten(timestep.observation), task)
+      )
 
-    viewer = mock.Mock(launch=mock.Mock(side_effect=launch))
-    with (
-      mock.patch.dict(sys.modules, {"dm_control.viewer": viewer}),
-      mock.patch("dm_control.viewer", viewer, create=True),
-    ):
+    app.launch.side_effect = launch
+    with mock.patch.object(
+      application, "Application", return_value=app
+    ) as make:
       view._open(policies.find(_POLICY, ""), "reach")
-    viewer.launch.assert_called_once()
+    make.assert_called_once_with("LfGP-DMC: reach")
+    app.launch.assert_called_once()
 
 
 @unittest.skipIf(graphics.fault(), graphics.fault())
@@ -138,21 +153,3 @@ class RenderingTest(FolderTest):
     self.assertEqual(first.args[1:], ("scheduler: reach", "step 0"))
     self.assertEqual(first.kwargs, {"highlight": False})
     self.assertEqual(last.args[1], "scheduler: close gripper")
-
-
-class OwnArraysTest(absltest.TestCase):
-  def test_the_readmes_lines_write_a_dataset(self):
-    blocks = (_ROOT / "README.md").read_text().split("```")
-    (code,) = [block for block in blocks if "d.write(" in block]
-    folder = self.create_tempdir("data/mine").full_path
-    arrays = {
-      "observation": np.zeros((5, 59), np.float32),
-      "action": np.zeros((5, 4), np.float32),
-      "next_observation": np.zeros((5, 59), np.float32),
-      "episode": np.array([0, 0, 1, 1, 1], np.int32),
-      "is_last": np.array([False, True, False, False, True]),
-    }
-    code = code.removeprefix("python").replace("data/mine", folder)
-    exec(code, arrays)
-    found = demonstrations.read_folder(folder, ["stack"], 59, 4)
-    self.assertLen(found["stack"], 5)

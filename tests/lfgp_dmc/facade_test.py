@@ -20,10 +20,10 @@ class _Policy:
     return cls()
 
   def begin(self, task, seed):
-    self._task = task
+    pass
 
-  def act(self, observation):
-    return np.full(4, self.tasks.index(self._task), np.float32)
+  def act(self, observation, task):
+    return np.full(4, self.tasks.index(task), np.float32)
 
 
 class FacadeTest(parameterized.TestCase):
@@ -46,6 +46,10 @@ class FacadeTest(parameterized.TestCase):
     observation = np.zeros(59, np.float32)
     self.assertEqual(main(observation)[0], 0)
     self.assertEqual(reach(observation)[0], 1)
+    self.assertEqual(main.intentions, ("stack", "reach"))
+    self.assertEqual(main(observation, "reach")[0], 1)
+    main.intention = "reach"
+    self.assertEqual(main(observation)[0], 1)
 
   def test_the_layout_covers_the_59_once(self):
     slices = [

@@ -193,5 +193,5 @@ class DemonstrationsTest(fixtures.FolderTest):
   def test_summary(self):
     table = demonstrations.summary_table({"reach": _DATA})
     header, row = table.splitlines()
-    self.assertIn("episodes", header)
-    self.assertEqual(row.split()[:6], ["reach", "6", "2", "3.0", "3", "16.67%"])
+    self.assertIn("attempts success median most", header)
+    self.assertEqual(row.split()[:6], ["reach", "6", "2", "1", "3", "3"])
