@@ -27,6 +27,12 @@ _COLLECTION = flags.DEFINE_enum(
   "collection", "reset", collection.COLLECTIONS, "play: no resets in between."
 )
 _PAIRS = flags.DEFINE_integer("pairs_per_task", 9000, "Pairs, exactly.", 1)
+_ATTEMPTS = flags.DEFINE_integer(
+  "attempts_per_task",
+  0,
+  "Whole successful attempts a task, instead of --pairs_per_task.",
+  lower_bound=0,
+)
 _FINALS = flags.DEFINE_integer(
   "final_pairs",
   0,
@@ -75,6 +81,7 @@ def main() -> int:
       _PAIRS.value,
       workers=_WORKERS.value or command.cores(),
       finals=_FINALS.value,
+      attempts=_ATTEMPTS.value,
     )
   except collection.NoSuccessError as error:
     raise command.UserError(f"--expert={_EXPERT.value}: {error}") from None
@@ -129,6 +136,11 @@ def _check_flags() -> tuple[pathlib.Path, list[str]]:
     raise command.UserError(
       f"--keep_longest_of={_LONGEST.value}; valid: 1 with --collection=play "
       "(its attempts follow from one another)"
+    )
+  if _ATTEMPTS.value and (_PAIRS.present or _FINALS.value):
+    raise command.UserError(
+      f"--attempts_per_task={_ATTEMPTS.value}; valid: 0 with --pairs_per_task "
+      "or --final_pairs"
     )
   valid = lfgp_dmc.task_set(_TASK.value)
   tasks = list(dict.fromkeys(_TASKS.value or valid))

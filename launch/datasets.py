@@ -1,11 +1,13 @@
 """The demonstrations of a run: read, or collected first."""
 
+import operator
 import pathlib
 import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
 
+from lfgp_dmc import seeding
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.launch.command import UserError
@@ -29,7 +31,7 @@ def load(
       "config.demonstrations is not set: give the dataset's folder, see "
       "launch/collect_demonstrations.py"
     )
-  from lfgp_dmc.tasks import mirror, published_examples
+  from lfgp_dmc.tasks import mirror, published_examples, translation
 
   folder = pathlib.Path(config.demonstrations)
   if not folder.exists():
@@ -44,28 +46,36 @@ def load(
     hint = "" if folder.exists() else f"\ncollect it: {_command(config)}"
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
-  return mirror.with_images(found) if config.mirror_demonstrations else found
+  if config.mirror_demonstrations:
+    found = mirror.with_images(found)
+  if config.shifted_copies:
+    generator = seeding.generator(config.seed, "shifts")
+    found = translation.with_copies(found, config.shifted_copies, generator)
+  return found
 
 
 def _counted(
   config: RunConfig, found: dict[str, Demonstrations]
 ) -> dict[str, Demonstrations]:
-  """The first `pairs_per_task` pairs of each task, if it has them."""
-  if not config.pairs_per_task:
-    return found
+  """The first pairs or attempts of each task, if it has as many as wanted."""
+  unit, count, cut = "pairs", len, Demonstrations.head
+  wanted = config.pairs_per_task
+  if config.attempts_per_task:
+    unit, wanted = "attempts", config.attempts_per_task
+    count, cut = operator.attrgetter(unit), Demonstrations.first_attempts
   short = [
-    f"{task} ({len(data)})"
+    f"{task} ({count(data)})"
     for task, data in found.items()
-    if len(data) < config.pairs_per_task
+    if count(data) < wanted
   ]
   if short:
     raise UserError(
-      f"config.pairs_per_task is {config.pairs_per_task}; "
-      f"{config.demonstrations} has fewer pairs of {', '.join(short)}"
+      f"config.{unit}_per_task is {wanted}; {config.demonstrations} has fewer "
+      f"{unit} of {', '.join(short)}"
     )
-  return {
-    task: data.head(config.pairs_per_task) for task, data in found.items()
-  }
+  if not wanted:
+    return found
+  return {task: cut(data, wanted) for task, data in found.items()}
 
 
 def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:

@@ -37,7 +37,9 @@ class RunConfig:
   # Demonstrations.
   demonstrations: Text = ""  # dataset folder: a file a task
   pairs_per_task: Count = 0  # use the first so many of each file; 0: all
+  attempts_per_task: Count = 0  # likewise whole attempts, instead; 0: all
   mirror_demonstrations: Switch = False  # and as many mirror images of them
+  shifted_copies: Count = 0  # of all these, elsewhere in the plane
   collect_pairs: Count = 0  # collect so many a task if there is no folder
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
@@ -95,10 +97,17 @@ class RunConfig:
       )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
-    if self.environment and self.mirror_demonstrations:
+    for name in ("mirror_demonstrations", "shifted_copies"):
+      value = getattr(self, name)
+      if self.environment and value:
+        yield (
+          f"{name} is {value}; valid: {type(value)()} with environment (only "
+          "the block tasks' symmetries are known)"
+        )
+    if self.attempts_per_task and self.pairs_per_task:
       yield (
-        "mirror_demonstrations is True; valid: False with environment (only "
-        "the block tasks' mirror image is known)"
+        f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
+        f"pairs_per_task={self.pairs_per_task}"
       )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))

@@ -46,8 +46,11 @@ def collect(
   workers: int = 1,
   progress: bool = True,
   finals: int = 0,
+  attempts: int = 0,
 ) -> dict[str, Collected]:
   """Collects exactly `pairs` pairs of each task, and `finals` on top.
+
+  Or, with `attempts`, so many whole successful attempts instead.
 
   Args:
     plan: environments, actor, T_all and seed.
@@ -59,6 +62,7 @@ def collect(
     progress: whether to show a progress bar.
     finals: extra pairs a task, each the row of success of a further attempt
       and an episode of its own (the authors' later journal version).
+    attempts: whole successful attempts a task; 0: pairs count.
 
   Raises:
     ValueError: an unknown collection or task.
@@ -73,9 +77,13 @@ def collect(
       raise ValueError(
         f"{task!r} is not a task of T_all: {', '.join(plan.tasks)}"
       )
-  piles = {task: _Pile(task, pairs, finals) for task in tasks}
+  if attempts:
+    pairs, finals = 0, attempts
+  piles = {task: _Pile(task, pairs, finals, attempts > 0) for task in tasks}
   with tqdm.tqdm(
-    total=(pairs + finals) * len(piles), unit="pair", disable=not progress
+    total=(pairs + finals) * len(piles),
+    unit="attempt" if attempts else "pair",
+    disable=not progress,
   ) as bar:
     units: list[str | None] = [None] if collection == "play" else [*piles]
     _fill(plan, piles, units, workers, bar)
@@ -120,8 +128,11 @@ def _jobs(units: list[str | None]) -> Iterator[Job]:
 class _Pile:
   """The pairs of one task so far."""
 
-  def __init__(self, task: str, pairs: int, finals: int):
-    self._task, self._pairs, self._wanted = task, pairs, pairs + finals
+  def __init__(self, task: str, pairs: int, finals: int, whole: bool):
+    """The finals' attempts are kept whole, or their rows of success alone."""
+    self._whole = whole
+    self._task, self._pairs, self._finals = task, pairs, finals
+    self._wanted = pairs + finals
     self._rows: list[Transition] = []
     self._stored = self._attempts = self._failures = 0
 
@@ -140,7 +151,8 @@ class _Pile:
       if self._failures >= _MOST_FAILURES:
         raise NoSuccessError(
           f"{self._task}: {self._failures} attempts in a row failed; "
-          f"{self._stored} of {self._wanted} pairs collected"
+          f"{self._stored} of {self._wanted} "
+          f"{'attempts' if self._whole else 'pairs'} collected"
         )
       return 0
     self._failures = 0
@@ -149,7 +161,8 @@ class _Pile:
       self._rows.append(attempt.rows)
       self._stored = min(before + len(attempt.rows.action), self._pairs)
     else:
-      self._rows.append(Transition(*(part[-1:] for part in attempt.rows)))
+      first = 0 if self._whole else -1
+      self._rows.append(Transition(*(part[first:] for part in attempt.rows)))
       self._stored += 1
     return self._stored - before
 
@@ -162,8 +175,9 @@ class _Pile:
     observation, action, next_observation = (
       np.concatenate(parts) for parts in zip(*self._rows, strict=True)
     )
-    finals = self._wanted - self._pairs
-    kept = np.r_[: self._pairs, len(action) - finals : len(action)]
+    kept = np.arange(len(action))
+    if not self._whole:
+      kept = np.r_[kept[: self._pairs], kept[len(kept) - self._finals :]]
     return Collected(
       Demonstrations(
         observation[kept],

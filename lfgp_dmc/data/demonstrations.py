@@ -51,6 +51,17 @@ class Demonstrations:
     cut = {name: array[:pairs] for name, array in self.arrays().items()}
     return Demonstrations(**cut, attributes=self.attributes)
 
+  @property
+  def attempts(self) -> int:
+    """How many whole attempts there are."""
+    return int(self.is_last.sum())
+
+  def first_attempts(self, attempts: int) -> "Demonstrations":
+    """The pairs of the first `attempts` whole attempts."""
+    kept = np.isin(self.episode, self.episode[self.is_last][:attempts])
+    cut = {name: array[kept] for name, array in self.arrays().items()}
+    return Demonstrations(**cut, attributes=self.attributes)
+
 
 def create_folder(path: files.Path) -> pathlib.Path:
   """Makes a new dataset folder; an existing one is never written into.
