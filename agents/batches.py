@@ -22,6 +22,7 @@ class Batch(NamedTuple):
   # int64 [B], where there are examples of success: the task that a row is an
   # example of, or -1 for a transition of the replay. Examples come last.
   example_task: torch.Tensor | None = None
+  replay_rows: int | None = None  # which come first; None: intentions take all
 
 
 class Draw(NamedTuple):

@@ -63,8 +63,9 @@ class ExpertPool:
     demonstrations: Mapping[str, Demonstrations],
     tasks: Sequence[str],
     standardiser: Standardiser,
+    final_rows: int = 1,
   ):
-    """Copies the demonstrations.
+    """Copies the demonstrations; see the config for `final_rows`.
 
     Raises:
       ValueError: a task has no demonstrations.
@@ -83,7 +84,7 @@ class ExpertPool:
     )
     self._standardiser = standardiser
     self._tasks = tuple(tasks)
-    last = [part.is_last for part in parts]
+    last = [_last_rows(part, final_rows) for part in parts]
     self._all = _Rows([np.ones_like(part) for part in last])
     self._finals = _Rows(last)
     # A task that has nothing but rows of success draws from them throughout.
@@ -122,10 +123,10 @@ class ExpertPool:
     return ExpertBatch(self._inputs[at], self._action[at])
 
   def sample_transitions(
-    self, generator: np.random.Generator, rows: int
+    self, generator: np.random.Generator, rows: int, main_share: float = 0.0
   ) -> Batch:
     """Draws `rows` transitions, of tasks as by `split`."""
-    at = self._all.draw(generator, self.split(rows))
+    at = self._all.draw(generator, self.split(rows, main_share))
     index = torch.from_numpy(at).to(self._device)
     return Batch(
       self._inputs[index], self._action[index], self._next_inputs[index]
@@ -141,11 +142,17 @@ class ExpertPool:
     at = torch.from_numpy(self._finals.draw(generator, task)).to(self._device)
     return self._next_inputs[at], self._action[at]
 
-  def split(self, rows: int) -> np.ndarray:
-    """The task of each of `rows` rows: equal shares, the rest the main's."""
+  def split(self, rows: int, main_share: float = 0.0) -> np.ndarray:
+    """The task of each of `rows` rows: equal shares, the rest the main's.
+
+    With a share of its own, the main task has that first.
+    """
     tasks = len(self._tasks)
+    own = int(main_share * rows) if tasks > 1 else 0
     counts = np.full(tasks, rows // tasks)
-    counts[0] += rows % tasks
+    if own:
+      counts[:] = (rows - own) // (tasks - 1)
+    counts[0] = rows - counts[1:].sum()
     return np.repeat(np.arange(tasks), counts)
 
 
@@ -167,3 +174,13 @@ class _Rows:
     size = None if columns is None else (len(task), columns)
     within = generator.integers(self.sizes[task], size=size)
     return self._rows[self._starts[task] + within]
+
+
+def _last_rows(part: Demonstrations, count: int) -> np.ndarray:
+  """The last `count` rows of every whole attempt, bool [N]."""
+  chosen = last = part.is_last.copy()
+  for _ in range(count - 1):
+    same = part.episode[1:] == part.episode[:-1]
+    last = np.append(last[1:] & same, False)
+    chosen = chosen | last
+  return chosen

@@ -1,5 +1,6 @@
 """The LfGP agent as the training loop sees it."""
 
+import copy
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -40,6 +41,12 @@ class LfgpAgent:
     self.learner = learner
     self.batches = batches
     self.policy = Policy(learner.networks.intentions, tasks)
+    self._prior_share = config.prior.acting_share
+    self._prior_policy = None
+    if self._prior_share:
+      assert learner.networks.prior is not None
+      self._prior_policy = Policy(learner.networks.prior, tasks)
+    self._is_prior = False
     self._scheduler = scheduler
     self._pretraining = pretraining
     self._experts = experts
@@ -117,11 +124,14 @@ class LfgpAgent:
       return
     learner = self.learner
     intentions = learner.networks.intentions
+    first = copy.deepcopy(intentions.state_dict())
     self._pretraining(
       intentions, self._experts, self.batches.generator, progress_bar
     )
     if learner.prior is not None:
       learner.prior.adopt(intentions)
+      if self._pretraining.config.prior_alone:
+        intentions.load_state_dict(first)
       learner.prior.warn_if_precise(
         self.tasks, self._experts, learner.intentions.target_entropy
       )
@@ -145,8 +155,12 @@ class LfgpAgent:
       index = self._scheduler.next_task()
       self._choices[index] += 1
       self._task = self.tasks[index]
+      if self._prior_policy is not None:
+        self._is_prior = self._acting.random() < self._prior_share
     self._episode_step += 1
-    return self.policy.act(
+    acting = self._prior_policy if self._is_prior else self.policy
+    assert acting is not None
+    return acting.act(
       observation, self._task, deterministic=False, generator=self._acting
     )
 

@@ -72,7 +72,12 @@ class BatchMaker:
     rows = int(share * self._rows)
     batch = self._transitions(self._rows - rows)
     if rows:
-      batch = joined(batch, self._pool.sample_transitions(self.generator, rows))
+      shown = self._pool.sample_transitions(
+        self.generator, rows, config.main_expert_share
+      )
+      batch = joined(batch, shown)
+      if not config.intentions_on_experts:
+        batch = batch._replace(replay_rows=self._rows - rows)
     return Draw(batch, policy, expert)
 
   def _transitions(self, rows: int) -> Batch:

@@ -58,7 +58,10 @@ def build(
   standardiser = make_standardiser(
     config.inputs, used, tasks, observation_size, action_size
   ).to(device)
-  experts = ExpertPool(used, tasks, standardiser) if used is not None else None
+  experts = None
+  if used is not None:
+    final_rows = getattr(config.reward, "final_rows", 1)
+    experts = ExpertPool(used, tasks, standardiser, final_rows)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
     config, len(tasks), action_size, standardiser, initial, device
@@ -103,7 +106,12 @@ def make_learner(
   return LfgpLearner(
     networks,
     reward,
-    CriticLearner(config.critic, shared, reward.bounds),
+    CriticLearner(
+      config.critic,
+      shared,
+      reward.bounds,
+      networks.prior if config.prior.in_targets else None,
+    ),
     IntentionLearner(config.intention, shared, prior),
     prior,
     generator,

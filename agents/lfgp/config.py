@@ -73,11 +73,14 @@ class DiscriminatorReward:
   noise: NonNegative = 0.0  # on standardised observations
   every: PositiveInt = 1  # updates between its updates
   final_share: Share = 0.0  # of expert pairs, rows of success
+  final_rows: PositiveInt = 1  # last rows of an attempt that count as such
   gradient_penalty: NonNegative = 10.0  # lambda
   gradient_penalty_per_task: Switch = False
   # Expert rows among those of critics and intentions.
   expert_share: Share = 0.0
   expert_share_decay: Share = 1.0  # factor an update
+  main_expert_share: Share = 0.0  # of these, the main task's; 0: an equal one
+  intentions_on_experts: Switch = True  # or only critics learn from these rows
 
 
 @checked
@@ -110,6 +113,7 @@ class PretrainingConfig:
   learning_rate: Positive = 3e-4  # falls to 0, a cosine
   loss: Literal["squared_error", "likelihood"] = "squared_error"
   std: NonNegative = 0.0  # of the cloned intentions; 0: as it comes out
+  prior_alone: Switch = False  # what is cloned; intentions start afresh
 
 
 @checked
@@ -120,6 +124,10 @@ class PriorConfig:
   distance: Literal["squared_error", "divergence"] = "squared_error"
   normalise: Switch = False  # times each task's mean |Q|
   decay: Share = 1.0  # factor on the weight, an update
+  # Only where the critics prefer its action to the intention's.
+  only_better: Switch = False
+  in_targets: Switch = False  # targets take the better of both actions
+  acting_share: Share = 0.0  # of the periods, in which the prior acts
 
 
 @checked

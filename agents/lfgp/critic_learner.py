@@ -24,8 +24,10 @@ class CriticLearner:
     config: CriticConfig,
     shared: Training,
     bounds: type[ValueBounds] = ValueBounds,
+    prior=None,
   ):
     """`bounds` are the value penalty's."""
+    self._prior = prior
     self._networks, optimiser, self._generator, self._dtype = shared
     parameters = list(self._networks.critics.parameters())
     self.optimiser = make_optimiser(
@@ -76,10 +78,18 @@ class CriticLearner:
     next_inputs = batch.next_inputs.to(self._dtype)
     mean, std = networks.intentions(next_inputs)
     action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
-    return soft_bellman_target(
+    target = soft_bellman_target(
       batch.reward,
       networks.target_critics(next_inputs, action),
       log_prob,
       networks.log_temperature.exp(),
       self._config.discount,
+    )
+    if self._prior is None:
+      return target
+    prior_mean, _ = self._prior(next_inputs)
+    other = networks.target_critics(next_inputs, torch.tanh(prior_mean))
+    value = torch.minimum(other[0], other[1])
+    return torch.maximum(
+      target, batch.reward + self._config.discount * value
     )

@@ -53,7 +53,9 @@ class DiscriminatorRewards(RewardSource):
   def label(self, batch: Batch) -> LabelledBatch:
     """Rewards by the discriminators as they are now."""
     reward = self.rewards(batch.inputs, batch.action)
-    return LabelledBatch(*batch[:3], reward)
+    return LabelledBatch(
+      *batch[:3], reward, policy_rows=batch.replay_rows
+    )
 
   def main_rewards(self, episode: Episode) -> np.ndarray:
     """By the discriminators as they are now, float32 [T]."""

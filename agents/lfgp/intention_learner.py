@@ -50,7 +50,13 @@ class IntentionLearner:
       log_prob, q, networks.log_temperature.detach().exp()
     )
     if self._prior is not None:
-      term, more = self._prior(inputs, mean, std, q.detach())
+      term, more = self._prior(
+        inputs,
+        mean,
+        std,
+        q.detach(),
+        lambda action: networks.critics.heads(critic_features, action),
+      )
       loss, metrics = loss + term, metrics | more
     norm = clipped_step(
       self.optimisers["policy"], loss, self._parameters, self._max_gradient_norm

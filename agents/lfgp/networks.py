@@ -71,7 +71,10 @@ def make_networks(
     critics=critics,
     target_critics=_frozen_copy(critics),
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
-    prior=_frozen_copy(intentions) if config.prior.weight else None,
+    prior=_frozen_copy(intentions) if config.prior.weight
+    or config.prior.in_targets
+    or config.prior.acting_share
+    else None,
   )
   reward = config.reward
   if not isinstance(reward, DiscriminatorReward):

@@ -74,6 +74,7 @@ class Prior:
     mean: torch.Tensor,
     std: torch.Tensor,
     q: torch.Tensor,
+    values=None,
   ) -> tuple[torch.Tensor, Metrics]:
     """The weighted distance, and the unweighted one by task.
 
@@ -85,7 +86,16 @@ class Prior:
     weight = (self._config.weight * self._faded).expand(len(mean))
     if self._config.normalise:
       weight = weight * torch.minimum(q[0], q[1]).abs().mean(-1)
-    if self._config.distance == "divergence":
+    if self._config.only_better:
+      with torch.no_grad():
+        mine, other = (
+          values(torch.tanh(part)).amin(0) for part in (mean, prior_mean)
+        )
+        better = (other > mine).float()
+      error = (torch.tanh(mean) - torch.tanh(prior_mean)).square().sum(-1)
+      loss = (weight * (better * error).mean(-1)).sum()
+      metrics = {"behaviour_cloning": better.mean(-1)}
+    elif self._config.distance == "divergence":
       loss, metrics = divergence_loss(mean, std, prior_mean, prior_std, weight)
     else:
       loss, metrics = behaviour_cloning_loss(
