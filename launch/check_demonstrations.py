@@ -17,7 +17,7 @@ from absl import flags
 import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
-from lfgp_dmc.data import demonstration_summary, demonstrations
+from lfgp_dmc.data import demonstration_summary, demonstrations, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
@@ -55,8 +55,8 @@ def main() -> None:
 def _read(widths: tuple[int, int]) -> dict[str, demonstrations.Demonstrations]:
   """Reads and describes; raises ValueError with every fault."""
   folder = pathlib.Path(_DATASET.value)
-  files = sorted(folder.glob(f"[!.]*{demonstrations.SUFFIX}"))
-  tasks = [path.stem for path in files] or ["TASK"]
+  paths = files.own(folder, demonstrations.SUFFIX)
+  tasks = [path.stem for path in paths] or ["TASK"]
   if _TASK.value and not _ENVIRONMENT.value:
     tasks = list(lfgp_dmc.task_set(_TASK.value))
   found = demonstrations.read_folder(folder, tasks, *widths)

@@ -114,9 +114,9 @@ def load_policy(
     A function from an observation, float32 [O], to an action, float32 [A].
 
   Raises:
-    FileNotFoundError: the folder holds no policy; the message names the file.
-    ValueError: a file is damaged, or the policy has no intention of that name;
-      the message names the file, or lists the intentions.
+    ValueError: the folder holds no policy, a file is damaged, or the policy has
+      no intention of that name; the message names the file, or lists the
+      intentions.
   """
   from lfgp_dmc.agents.policy import Policy
 

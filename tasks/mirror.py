@@ -5,10 +5,12 @@ the plane y = 0.5: an attempt's mirror image is another attempt, from a start
 that nobody had to demonstrate.
 """
 
+import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
 
+from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.observations import OBSERVATION_SIZE, OBSERVATION_SLICES
 from lfgp_dmc.tasks import workspace as ws
@@ -76,15 +78,10 @@ def with_images(
 
 
 def _with_images(data: Demonstrations) -> Demonstrations:
-  images: dict[str, np.ndarray] = {
-    "observation": observation(data.observation),
-    "action": action(data.action),
-    "next_observation": observation(data.next_observation),
-    "episode": data.episode + data.episode.max(initial=-1) + 1,
-    "is_last": data.is_last,
-  }
-  both = {
-    name: np.concatenate([array, images[name]])
-    for name, array in data.arrays().items()
-  }
-  return Demonstrations(**both, attributes=data.attributes)
+  images = dataclasses.replace(
+    data,
+    observation=observation(data.observation),
+    action=action(data.action),
+    next_observation=observation(data.next_observation),
+  )
+  return demonstrations.joined([data, images])

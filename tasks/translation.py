@@ -5,10 +5,12 @@ attempt that is shifted as a whole is another attempt, from a start that nobody
 had to demonstrate.
 """
 
+import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
 
+from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.observations import OBSERVATION_SLICES
 from lfgp_dmc.tasks import workspace as ws
@@ -68,18 +70,14 @@ def _with_copies(
   highest = np.maximum.reduceat(visited.max((0, 2)), starts)
   low = np.clip(_LOW - lowest, -_REACH, 0)
   high = np.clip(_HIGH - highest, 0, _REACH)
-  parts = [data.arrays()]
-  for copy in range(1, copies + 1):
+  parts = [data]
+  for _ in range(copies):
     shift = generator.uniform(low, high).astype(np.float32)[attempt]
     parts.append(
-      {
-        **data.arrays(),
-        "observation": observation(data.observation, shift),
-        "next_observation": observation(data.next_observation, shift),
-        "episode": data.episode + np.int32(copy * (data.episode.max() + 1)),
-      }
+      dataclasses.replace(
+        data,
+        observation=observation(data.observation, shift),
+        next_observation=observation(data.next_observation, shift),
+      )
     )
-  joined = {
-    name: np.concatenate([part[name] for part in parts]) for name in parts[0]
-  }
-  return Demonstrations(**joined, attributes=data.attributes)
+  return demonstrations.joined(parts)

@@ -3,10 +3,11 @@
 import contextlib
 import pathlib
 import resource
+import tempfile
 from collections.abc import Iterator
 
 import numpy as np
-from absl.testing import parameterized
+from absl.testing import absltest, parameterized
 
 from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
@@ -28,6 +29,13 @@ class FolderTest(parameterized.TestCase):
   def setUp(self):
     super().setUp()
     self.folder = pathlib.Path(self.create_tempdir().full_path)
+
+
+def class_folder(test: type[absltest.TestCase]) -> pathlib.Path:
+  """An empty folder for all tests of a class."""
+  temporary = tempfile.TemporaryDirectory()
+  test.addClassCleanup(temporary.cleanup)
+  return pathlib.Path(temporary.name)
 
 
 def demonstrations(*lengths: int) -> Demonstrations:

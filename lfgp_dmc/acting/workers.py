@@ -49,7 +49,7 @@ def ordered(
     return
   jobs = iter(jobs)
   crew: list[_Worker] = []
-  threads = concurrent.futures.ThreadPoolExecutor(workers)  # each waits for one
+  waiting = concurrent.futures.ThreadPoolExecutor(workers)  # each for one
   try:
     resource_tracker.ensure_running()  # its start lets signals through again
     with signals.held(), _variables():
@@ -65,19 +65,19 @@ def ordered(
         idle.append(worker)
 
     flying = collections.deque(
-      threads.submit(do, job) for job in itertools.islice(jobs, 2 * workers)
+      waiting.submit(do, job) for job in itertools.islice(jobs, 2 * workers)
     )
     while flying:
       result = flying.popleft().result()
       flying.extend(
-        threads.submit(do, job) for job in itertools.islice(jobs, 1)
+        waiting.submit(do, job) for job in itertools.islice(jobs, 1)
       )
       yield result
   finally:
     with signals.held():
       for worker in crew:
         worker.kill()
-      threads.shutdown(cancel_futures=True)
+      waiting.shutdown(cancel_futures=True)
 
 
 class _Worker:

@@ -50,8 +50,7 @@ class Demonstrations:
 
   def head(self, count: int) -> "Demonstrations":
     """The first `count` pairs."""
-    cut = {name: array[:count] for name, array in self.arrays().items()}
-    return Demonstrations(**cut, attributes=self.attributes)
+    return self._rows(slice(count))
 
   @property
   def attempts(self) -> int:
@@ -60,9 +59,29 @@ class Demonstrations:
 
   def head_attempts(self, count: int) -> "Demonstrations":
     """The pairs of the first `count` whole attempts."""
-    kept = np.isin(self.episode, self.episode[self.is_last][:count])
-    cut = {name: array[kept] for name, array in self.arrays().items()}
-    return Demonstrations(**cut, attributes=self.attributes)
+    return self._rows(np.isin(self.episode, self.episode[self.is_last][:count]))
+
+  def _rows(self, kept: slice | np.ndarray) -> "Demonstrations":
+    cut: dict[str, Any] = {k: v[kept] for k, v in self.arrays().items()}
+    return dataclasses.replace(self, **cut)
+
+
+def joined(parts: Sequence[Demonstrations]) -> Demonstrations:
+  """One after the other; every attempt keeps a number of its own.
+
+  Attributes are the first's.
+  """
+  counts = [part.episode.max(initial=-1) + 1 for part in parts]
+  first = np.cumsum([0, *counts[:-1]], dtype=np.int32)
+  numbered = [
+    {**part.arrays(), "episode": part.episode + start}
+    for part, start in zip(parts, first, strict=True)
+  ]
+  arrays = {
+    name: np.concatenate([part[name] for part in numbered])
+    for name in checks.DTYPES
+  }
+  return Demonstrations(**arrays, attributes=parts[0].attributes)
 
 
 def from_attempts(

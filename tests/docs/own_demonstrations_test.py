@@ -2,10 +2,8 @@
 
 import contextlib
 import os
-import pathlib
 import re
 import shutil
-import tempfile
 
 import h5py
 import numpy as np
@@ -41,9 +39,7 @@ class OwnDemonstrationsTest(fixtures.FolderTest):
   @classmethod
   def setUpClass(cls):
     super().setUpClass()
-    temporary = tempfile.TemporaryDirectory()
-    cls.addClassCleanup(temporary.cleanup)
-    cls.recorded = pathlib.Path(temporary.name)
+    cls.recorded = fixtures.class_folder(cls)
     with contextlib.chdir(cls.recorded):
       cls.code = pages.run(_PAGE)
 

@@ -3,7 +3,6 @@
 import json
 import pathlib
 import subprocess
-import tempfile
 
 from absl.testing import absltest
 
@@ -11,7 +10,7 @@ from lfgp_dmc import graphics, task_names
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.launch import command, policies, training
 from lfgp_dmc.pictures import video
-from tests.fixtures import FolderTest
+from tests.fixtures import FolderTest, class_folder
 from tests.launch import fixtures
 
 _ROOT = pathlib.Path(command.__file__).resolve().parents[1]
@@ -48,9 +47,7 @@ class BlockRunTest(absltest.TestCase):
   @classmethod
   def setUpClass(cls):
     super().setUpClass()
-    temporary = tempfile.TemporaryDirectory()
-    cls.addClassCleanup(temporary.cleanup)
-    cls.folder = pathlib.Path(temporary.name)
+    cls.folder = class_folder(cls)
     dataset = fixtures.write_dataset(
       cls.folder / "data", task_names.task_set("bring"), 59, 4
     )

@@ -12,19 +12,19 @@ from lfgp_dmc.launch.command import UserError
 from tests.launch import fixtures
 
 
+def _stack(dataset, **changes):
+  return fixtures.small_config(
+    dataset, environment="", main_task="stack", **changes
+  )
+
+
 class DatasetsTest(fixtures.RunTest):
   def test_mirror_images_double_what_was_shown(self):
     dataset = fixtures.write_dataset(
       self.folder / "shown", ("stack", "move_object"), 59, 4, pairs=20
     )
     for mirror, pairs in ((False, 15), (True, 30)):
-      config = fixtures.small_config(
-        dataset,
-        environment="",
-        main_task="stack",
-        mirror_demonstrations=mirror,
-        pairs_per_task=15,
-      )
+      config = _stack(dataset, mirror_demonstrations=mirror, pairs_per_task=15)
       shown = datasets.load(config, ["stack", "move_object"], (59, 4))
       self.assertLen(shown["stack"], pairs)
       self.assertLen(shown["move_object"], 15)
@@ -33,13 +33,8 @@ class DatasetsTest(fixtures.RunTest):
     dataset = fixtures.write_dataset(
       self.folder / "shown", ("stack", "bring"), 59, 4, pairs=20
     )
-    config = fixtures.small_config(
-      dataset,
-      environment="",
-      main_task="stack",
-      mirror_demonstrations=True,
-      shifted_copies=2,
-      attempts_per_task=1,
+    config = _stack(
+      dataset, mirror_demonstrations=True, shifted_copies=2, attempts_per_task=1
     )
     shown, again = (
       datasets.load(config, ["stack", "bring"], (59, 4)) for _ in range(2)
