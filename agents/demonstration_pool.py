@@ -17,14 +17,18 @@ def make_standardiser(
   tasks: Sequence[str],
   observation_size: int,
   action_size: int,
+  features: int = 0,
 ) -> Standardiser:
   """Checks the demonstrations, if any are used, and fits to them if configured.
+
+  An encoder's features, if there are any, come behind an observation's floats.
 
   Raises:
     ValueError: a task has no demonstrations, or they are of other sizes than
       the environment's O and A.
   """
-  standardiser = Standardiser(observation_size, config.tanh_feature_scale)
+  size = observation_size + features
+  standardiser = Standardiser(size, config.tanh_feature_scale)
   if demonstrations is None:
     return standardiser
   observation = _pooled(demonstrations, tasks)

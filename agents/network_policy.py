@@ -16,13 +16,14 @@ class NetworkPolicy(Policy):
     self._network = network
     self._tensors = network.state_dict(keep_vars=True)  # not copied
     scale = network.standardiser.tanh_feature_scale
-    super().__init__(self._tensors, tasks, scale)
+    seen = () if network.encoder is None else network.encoder.frame_shape
+    super().__init__(self._tensors, tasks, scale, seen)
 
   def arrays(self) -> dict[str, np.ndarray]:
     """See `Policy.arrays`."""
     return serialisation.module_state(self._network)
 
-  def _read(self, name: str, index: int) -> np.ndarray:
+  def _read(self, name: str, index: int = 0) -> np.ndarray:
     tensor = self._tensors[name].detach()
     if name.startswith("heads."):
       tensor = tensor[index]

@@ -4,6 +4,8 @@ In NumPy: a product of one row takes no library of networks, and what acts
 starts at once, wherever it runs.
 """
 
+import dataclasses
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,7 +15,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from lfgp_dmc.agents import fields
+from lfgp_dmc.agents import fields, vision
 from lfgp_dmc.agents.fields import NetworksConfig
 from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
@@ -33,6 +35,13 @@ class PolicyOptions(NetworksConfig):
   observation_size: fields.PositiveInt
   action_size: fields.PositiveInt
   tanh_feature_scale: fields.NonNegative = 0.0
+  # Of an encoder: [C, H, W, 3] of frames, of which it makes the last features
+  # of an observation, and its channels.
+  frame_shape: list[fields.PositiveInt] = dataclasses.field(
+    default_factory=list
+  )
+  features: fields.Count = 0
+  channels: fields.Count = 0
   env_step: fields.Count = 0  # how long it was trained
 
   def shapes(self) -> dict[str, tuple[int, ...]]:
@@ -49,6 +58,8 @@ class PolicyOptions(NetworksConfig):
       out = 2 * self.action_size if name == _OUTPUT else hidden
       shapes[f"{name}.weight"] = (len(tasks), width, out)
       shapes[f"{name}.bias"] = (len(tasks), 1, out)
+    if self.frame_shape:
+      shapes |= vision.shapes(self.frame_shape, self.features, self.channels)
     return shapes
 
 
@@ -60,6 +71,7 @@ class Policy:
   Attributes:
     tasks: the intentions' names.
     deterministic: whether `act` takes tanh(mean), or a sample, by default.
+    frame_shape: [C, H, W, 3] of what it sees; empty if it has no encoder.
   """
 
   def __init__(
@@ -67,10 +79,12 @@ class Policy:
     arrays: Mapping[str, np.ndarray],
     tasks: Sequence[str],
     tanh_feature_scale: float = 0.0,
+    frame_shape: Sequence[int] = (),
   ):
     """Takes arrays by their names in stored policies."""
     self.tasks = tuple(tasks)
     self.deterministic = True
+    self.frame_shape = tuple(frame_shape)
     self._arrays = arrays
     self._scale = tanh_feature_scale
     self._hidden = [name for name in _HIDDEN if f"{name}.weight" in arrays]
@@ -94,7 +108,8 @@ class Policy:
       raise ValueError("; ".join(faults)) from None
     fields.check_arrays(arrays, checked.shapes(), "policy arrays")
     single = {name: np.asarray(a, np.float32) for name, a in arrays.items()}
-    return Policy(single, checked.tasks, checked.tanh_feature_scale)
+    scale, shape = checked.tanh_feature_scale, checked.frame_shape
+    return Policy(single, checked.tasks, scale, shape)
 
   @classmethod
   def load(cls, folder: str | os.PathLike[str]) -> "Policy":
@@ -149,7 +164,14 @@ class Policy:
     """The JSON-able options that `from_arrays` takes beside the arrays."""
     shapes = {name: array.shape for name, array in self._arrays.items()}
     is_separate = f"{_SECOND}.weight" in shapes
-    return {
+    seen = {}
+    if self.frame_shape:
+      seen = {
+        "frame_shape": list(self.frame_shape),
+        "features": shapes["encoder.output.weight"][0],
+        "channels": shapes["encoder.sharpness"][0],
+      }
+    return seen | {
       "tasks": list(self.tasks),
       "observation_size": shapes[_MEAN][0],
       "action_size": self.action_size,
@@ -183,7 +205,7 @@ class Policy:
     """Chooses actions: raw float32 [O] or [B, O] -> [A] or [B, A] in [-1, 1].
 
     Args:
-      observation: one, or a batch.
+      observation: one, or a batch; with an encoder, its pixels or features.
       task: whose intention acts; None: the task that `begin` named.
       deterministic: tanh(mean), or a sample; None: the policy's own setting.
       generator: source of the sample; None: the one that `begin` seeded.
@@ -196,17 +218,29 @@ class Policy:
       deterministic = self.deterministic
     raw = np.asarray(observation, np.float32)
     width = self._arrays[_MEAN].shape[0]
+    encodes = bool(self.frame_shape) and raw.shape[-1:] != (width,)
+    if encodes:
+      own = width - len(self._read("encoder.output.bias"))
+      width = own + math.prod(self.frame_shape)
     if raw.ndim not in (1, 2) or raw.shape[-1] != width:
       raise ValueError(
         f"observation has shape {raw.shape}; valid: ({width},) or (B, {width})"
       )
-    mean, std = np.split(self._gaussian(np.atleast_2d(raw), index), 2, axis=-1)
+    rows = np.atleast_2d(raw)
+    if encodes:
+      features = self.encode(rows[:, own:].reshape(-1, *self.frame_shape))
+      rows = np.hstack([rows[:, :own], features])
+    mean, std = np.split(self._gaussian(rows, index), 2, axis=-1)
     if not deterministic:
       source = self._generator if generator is None else generator
       noise = source.standard_normal(mean.shape, np.float32)
       mean = mean + (np.logaddexp(0, std) + 1e-7) * noise
     action = np.tanh(mean)
     return action if raw.ndim > 1 else action[0]
+
+  def encode(self, frames: np.ndarray) -> np.ndarray:
+    """Features, float32 [N, F], of frames [N, C, H, W, 3], 0 to 255."""
+    return vision.encode(self._read, frames)
 
   def _gaussian(self, raw: np.ndarray, index: int) -> np.ndarray:
     """Mean and raw std before the tanh, [B, 2A], for observations [B, O]."""
@@ -223,7 +257,7 @@ class Policy:
       weight = weight.T
     return rows @ weight + self._read(f"{name}.bias", index)
 
-  def _read(self, name: str, index: int) -> np.ndarray:
+  def _read(self, name: str, index: int = 0) -> np.ndarray:
     """An array, or a task's part of those that differ by task."""
     array = self._arrays[name]
     return array[index] if name.startswith(_HEADS) else array

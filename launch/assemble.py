@@ -1,21 +1,28 @@
 """The parts of a run, made once from its config."""
 
+import dataclasses
 import functools
 import os
 import pathlib
 from typing import NamedTuple
 
 import dm_env
+import numpy as np
 import torch
 
 from lfgp_dmc import seeding, task_names
 from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.agents.networks import encoder as encoders
+from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import command, datasets, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc.observations import REWARD_PREFIX, SUCCESS_PREFIX
+from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import TrainSchedule
@@ -29,24 +36,66 @@ class Parts(NamedTuple):
 
   environment: dm_env.Environment
   tasks: tuple[str, ...]  # that are learned, the main task first
-  widths: tuple[int, int]  # (O, A)
+  widths: tuple[int, int]  # (O, A); of cloning from pixels, without them
   demonstrations: dict[str, Demonstrations]
   device: torch.device
+  frame_shape: tuple[int, ...] = ()  # [C, H, W, 3] if it acts from pixels
+  encoder: Encoder | None = None  # has made the features of all observations
 
 
-def make_parts(config: RunConfig) -> Parts:
+def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   """Sets torch up, builds the environment, reads the demonstrations.
 
+  From pixels, acting agents see the features that the encoder of a clone makes
+  (of `config.init_from`, or of the run in the folder, if there is one).
+
   Raises:
-    UserError: there is no such device, environment or dataset.
+    UserError: there is no such device, environment, dataset or encoder.
   """
   device = _set_up_torch(config)
   with command.checked_input():
     environment = config.environment_spec.build(config.agent.keeps_rewards)
     tasks = tasks_of(config, environment)
+    shape = environments.frame_shape(environment)
     widths = environments.widths(environment)
-  demonstrations = datasets.load(config, tasks, widths)
-  return Parts(environment, tasks, widths, demonstrations, device)
+  found = datasets.load(config, tasks, widths, shape)
+  if not shape or ALGORITHMS[config.algorithm].is_supervised:
+    return Parts(environment, tasks, widths, found, device, shape)
+  clone = _clone_of(config, folder)
+  environment = environments.with_features(environment, clone.encode)
+  found = {task: _with_features(data, clone) for task, data in found.items()}
+  widths = environments.widths(environment)
+  encoder = encoders.frozen(clone)
+  return Parts(environment, tasks, widths, found, device, shape, encoder)
+
+
+def _clone_of(config: RunConfig, folder: pathlib.Path | None) -> Policy:
+  """Whose encoder is used: the run's own policy, or what it starts from."""
+  if not config.init_from:
+    raise UserError(
+      "config.init_from is not set: from pixels, give the folder of a clone, "
+      "whose encoder is used: train one by --preset=pixels "
+      "--config.algorithm=multitask_bc (or bc, for dac)"
+    )
+  source: files.Path = config.init_from
+  if folder is not None and (folder / run_folder.ARRAYS_NAME).exists():
+    source = folder
+  with command.checked_input():
+    policy = Policy.load(source)
+  if not policy.frame_shape:
+    raise UserError(f"config.init_from: {config.init_from} sees no pixels")
+  return policy
+
+
+def _with_features(data: Demonstrations, clone: Policy) -> Demonstrations:
+  """Demonstrations with features in the place of frames."""
+  assert data.frames is not None, "they were checked"
+  features, rows = clone.encode(data.frames), data.frame_rows()
+  return dataclasses.replace(
+    data,
+    observation=np.hstack([data.observation, features[rows]]),
+    next_observation=np.hstack([data.next_observation, features[rows + 1]]),
+  )
 
 
 def tasks_of(
@@ -95,6 +144,8 @@ def make_agent(
     *parts.widths,
     bfloat16=config.bfloat16,
     cuda_graphs=config.cuda_graphs,
+    frame_shape=parts.frame_shape,
+    encoder=parts.encoder,
   )
 
 
@@ -113,6 +164,7 @@ def make_run(
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
     progress_bar,
+    draws=bool(config.camera_size),
   )
   return Run(
     folder,

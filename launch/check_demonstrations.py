@@ -30,6 +30,9 @@ _TASK = flags.DEFINE_string(
 _ENVIRONMENT = flags.DEFINE_string(
   "environment", "", "As config.environment; default: the block tasks."
 )
+_CAMERA = flags.DEFINE_integer(
+  "camera_size", 0, "As config.camera_size, of demonstrations with frames.", 0
+)
 _STRIP = flags.DEFINE_string("strip", "", "A .png for the film strips.")
 
 _COLUMNS = 6
@@ -44,22 +47,27 @@ def main() -> None:
     _check_strip(pathlib.Path(_STRIP.value))
   with command.checked_input():
     spec = EnvironmentSpec(
-      _TASK.value or lfgp_dmc.MAIN_TASKS[0], _ENVIRONMENT.value
+      _TASK.value or lfgp_dmc.MAIN_TASKS[0],
+      _ENVIRONMENT.value,
+      camera_size=_CAMERA.value,
     )
     with contextlib.closing(spec.build()) as environment:
-      found = _read(environments.widths(environment))
+      shape = environments.frame_shape(environment)
+      found = _read(environments.widths(environment), shape)
       if _STRIP.value:
         _draw(environment, found)
 
 
-def _read(widths: tuple[int, int]) -> dict[str, demonstrations.Demonstrations]:
+def _read(
+  widths: tuple[int, int], shape: tuple[int, ...]
+) -> dict[str, demonstrations.Demonstrations]:
   """Reads and describes; raises ValueError with every fault."""
   folder = pathlib.Path(_DATASET.value)
   paths = files.own(folder, demonstrations.SUFFIX)
   tasks = [path.stem for path in paths] or ["TASK"]
   if _TASK.value and not _ENVIRONMENT.value:
     tasks = list(lfgp_dmc.task_set(_TASK.value))
-  found = demonstrations.read_folder(folder, tasks, *widths)
+  found = demonstrations.read_folder(folder, tasks, *widths, shape)
   print(demonstration_summary.table(found))
   rates = sorted({data.attributes["control_hz"] for data in found.values()})
   print(
@@ -79,6 +87,8 @@ def _check_strip(strip: pathlib.Path) -> None:
     raise UserError(f"--strip={strip}; valid: a new .png file")
   if _ENVIRONMENT.value:
     raise UserError("--strip shows the block tasks alone, not --environment")
+  if _CAMERA.value:
+    raise UserError("--strip draws states; valid: without --camera_size")
   if fault := graphics.fault():
     raise UserError(fault)
 

@@ -6,11 +6,12 @@
 import dataclasses
 import functools
 import pathlib
+from typing import Any
 
 from absl import flags
 
 import lfgp_dmc
-from lfgp_dmc.acting import collection
+from lfgp_dmc.acting import collection, environments
 from lfgp_dmc.acting.attempts import CollectionPlan
 from lfgp_dmc.data import demonstration_summary, demonstrations, files
 from lfgp_dmc.launch import command, policies
@@ -58,6 +59,13 @@ _WORKERS = flags.DEFINE_integer(
 
 _HERTZ = flags.DEFINE_integer(
   "control_hz", 20, "Control steps a second: 20, 10 or 5."
+)
+
+_CAMERA = flags.DEFINE_integer(
+  "camera_size",
+  0,
+  "Pairs from pixels: the side of the cameras' frames; 0: the 59 floats.",
+  lower_bound=0,
 )
 
 
@@ -129,14 +137,23 @@ def _plan() -> CollectionPlan:
       f"--expert={_EXPERT.value} cannot do {', '.join(lacking)} of "
       f"--task={_TASK.value}; it can do: {', '.join(spec.tasks)}"
     )
+  options: dict[str, Any] = {"control_hz": _HERTZ.value}
+  shape: tuple[int, ...] = ()
+  if _CAMERA.value:
+    # A policy from pixels is to see no more; other experts need the state.
+    seen = "vision" if spec.environment_spec.camera_size else "all"
+    options |= {"observations": seen, "camera_size": _CAMERA.value}
+    with command.checked_input():
+      shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
   return CollectionPlan(
-    functools.partial(lfgp_dmc.load, control_hz=_HERTZ.value),
+    functools.partial(lfgp_dmc.load, **options),
     make_actor,
     _TASK.value,
     tasks,
     _SEED.value,
     _HERTZ.value,
     keep_longest_of=_LONGEST.value,
+    frame_shape=shape,
   )
 
 

@@ -17,7 +17,10 @@ _COLLECT = pathlib.Path(__file__).with_name("collect_demonstrations.py")
 
 
 def load(
-  config: RunConfig, tasks: Sequence[str], widths: tuple[int, int]
+  config: RunConfig,
+  tasks: Sequence[str],
+  widths: tuple[int, int],
+  frame_shape: tuple[int, ...] = (),
 ) -> dict[str, Demonstrations]:
   """Task -> demonstrations; none if the agent uses none.
 
@@ -37,10 +40,10 @@ def load(
   if not folder.exists():
     _collect(config)
   try:
-    if published_examples.is_folder_of_examples(folder):
+    if not frame_shape and published_examples.is_folder_of_examples(folder):
       found = published_examples.read_folder(folder, tasks)
     else:
-      found = demonstrations.read_folder(folder, tasks, *widths)
+      found = demonstrations.read_folder(folder, tasks, *widths, frame_shape)
     _check_rate(config, found)
   except ValueError as error:
     hint = "" if folder.exists() else f"\ncollect it: {_command(config)}"
@@ -123,10 +126,12 @@ def _flags(config: RunConfig) -> list[str]:
     "pairs_per_task": config.collect_pairs or "...",
     "seed": config.seed,
     "control_hz": config.control_hz,
+    "camera_size": config.camera_size,
     "output": config.demonstrations,
   }
   if ALGORITHMS[config.algorithm].is_multitask:
     del flags["tasks"]
-  if config.control_hz == RunConfig.control_hz:
-    del flags["control_hz"]
+  for name in ("control_hz", "camera_size"):
+    if flags[name] == getattr(RunConfig, name):
+      del flags[name]
   return [f"--{name}={value}" for name, value in flags.items()]

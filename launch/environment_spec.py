@@ -6,10 +6,12 @@ import inspect
 import os
 import sys
 from collections.abc import Callable
+from typing import Any
 
 import dm_env
 
 import lfgp_dmc
+from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
 from lfgp_dmc.task_names import check_task
 
@@ -23,6 +25,7 @@ class EnvironmentSpec:
   main_task: str
   environment: str = ""  # of the block tasks; or `package.module:factory`
   control_hz: int = 20  # of the block tasks: 20, 10 or 5
+  camera_size: int = 0  # of the block tasks' frames; 0: the 59 floats
 
   def build(
     self, show_rewards: bool = False, seed: int | None = None
@@ -39,11 +42,15 @@ class EnvironmentSpec:
         return environments.with_unit_actions(made)
       except (AttributeError, ValueError) as error:
         raise ValueError(f"{_FIELD}={self.environment}: {error}") from None
+    seen: dict[str, Any] = {}
+    if self.camera_size:
+      seen = {"observations": "vision", "camera_size": self.camera_size}
     return lfgp_dmc.load(
       self.main_task,
       seed,
       control_hz=self.control_hz,
       show_rewards=show_rewards,
+      **seen,
     )
 
   def check(self) -> None:
@@ -55,6 +62,10 @@ class EnvironmentSpec:
       _imported(self.environment)
     else:
       check_task(self.main_task)
+    if self.camera_size:
+      graphics.allow_pictures()
+      if fault := graphics.fault():
+        raise ValueError(f"config.camera_size is {self.camera_size}: {fault}")
 
 
 def _imported(path: str) -> Callable[..., dm_env.Environment]:

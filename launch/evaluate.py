@@ -66,6 +66,7 @@ def main() -> None:
       _SEED.value,
       _WORKERS.value or command.cores(),
       env_step=spec.env_step,
+      draws=bool(spec.environment_spec.camera_size),
     )
   print(evaluation_csv.success_table(rows))
   if output is not None:

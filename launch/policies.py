@@ -80,7 +80,10 @@ def find(
     policy: Any = stored_policy(str(path))
     main_task = config.get("main_task", policy.tasks[0])
     spec = EnvironmentSpec(
-      main_task, config.get("environment", ""), config.get("control_hz", 20)
+      main_task,
+      config.get("environment", ""),
+      config.get("control_hz", 20),
+      config.get("camera_size", 0),
     )
     spec.check()
   except (ValueError, OSError) as error:

@@ -12,6 +12,7 @@ from absl import logging
 from lfgp_dmc.agents.lfgp.agent import LfgpAgent
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
+from lfgp_dmc.data.demonstration_checks import FRAMES
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, command, sizes
@@ -49,7 +50,7 @@ def train(
       folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
       stored = run_folder.read_config(path)
     sha256 = stored.get("demonstrations_sha256", "")  # none in older runs
-  parts = assemble.make_parts(config)
+  parts = assemble.make_parts(config, path if resume else None)
   if found := parts.demonstrations:
     pairs = sum(map(len, found.values()))
     print(
@@ -82,7 +83,11 @@ def _sha256(found: dict[str, Demonstrations]) -> str:
   """Of all arrays, wherever they lie."""
   digest = hashlib.sha256()
   for task, data in found.items():
-    for name, array in data.arrays().items():
+    arrays = data.arrays()
+    if data.frames is not None:  # observations may be features by now
+      del arrays["observation"], arrays["next_observation"]
+      arrays[FRAMES] = data.frames
+    for name, array in arrays.items():
       digest.update(f"{task} {name} {array.shape}".encode())
       digest.update(np.ascontiguousarray(array).data)
   return digest.hexdigest()

@@ -54,9 +54,10 @@ def load(
   Args:
     task: a name in `ALL_TASKS`.
     seed: fixes everything random in the environment; None draws a fresh seed.
-    **options: `reward` ("sparse" or "dense"), `observations` ("features" or
-      "vision"), `spawn` ("published" or "full_tray"), `control_hz` (20 Hz),
-      `time_limit` (18.0 s), `show_rewards` (False); see `tasks.load`.
+    **options: `reward` ("sparse" or "dense"), `observations` ("features",
+      "vision" or "all"), `camera_size` (64), `spawn` ("published" or
+      "full_tray"), `control_hz` (20 Hz), `time_limit` (18.0 s), `show_rewards`
+      (False); see `tasks.load`.
 
   Returns:
     A `dm_control.composer.Environment`, which is a `dm_env.Environment`.
@@ -65,7 +66,7 @@ def load(
     a dictionary: `flatten`, `successes`, `conditions` read it.
 
   Raises:
-    ValueError: an unknown task, option or value, with the valid ones; vision
+    ValueError: an unknown task, option or value, with the valid ones; frames
       where no pictures can be made.
   """
   from lfgp_dmc import tasks

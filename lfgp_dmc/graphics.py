@@ -30,6 +30,8 @@ _GLFW = ("glfw", "on", "enable", "enabled", "true", "1")
 _PLATFORM_DEVICE = 0x313F  # EGL_PLATFORM_DEVICE_EXT
 _MOST_DEVICES = 10  # as many as dm_control looks at
 
+_off_is_ours = False  # whether "off" was our choice, not the user's
+
 
 def choose_backend(render: bool = True, window: bool = False) -> str:
   """Sets `MUJOCO_GL` and `PYOPENGL_PLATFORM` for this process and its children.
@@ -47,10 +49,12 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
   Raises:
     ValueError: dm_control could not be imported with the user's `MUJOCO_GL`.
   """
+  global _off_is_ours
   imported = sys.modules.get("dm_control._render")
   chosen = _requested() or getattr(imported, "BACKEND", None) or ""
   if not chosen or (not os.environ.get(_GL) and _fault_of(chosen)):
     chosen = _best(render, window)
+    _off_is_ours = not (render or window)
   if chosen not in ("glfw", "off") and (reason := _fault_of(chosen)):
     raise ValueError(reason)
   os.environ[_GL] = chosen
@@ -61,6 +65,13 @@ def choose_backend(render: bool = True, window: bool = False) -> str:
   if imported and chosen != imported.BACKEND:
     importlib.reload(imported)
   return chosen
+
+
+def allow_pictures() -> None:
+  """Undoes a `choose_backend(render=False)`: frames are wanted after all."""
+  if _off_is_ours:
+    os.environ.pop(_GL, None)
+    choose_backend()
 
 
 def fault() -> str:

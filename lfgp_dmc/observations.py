@@ -2,6 +2,9 @@
 
 The order is the released code's, so that published data line up. Observations
 also carry `success/<task>` and `condition/<task>`, which are not of the 59.
+
+From pixels, flat observations are the 18 floats that a robot senses, then the
+frames of all cameras, [C, H, W, 3], as floats 0 to 255.
 """
 
 from collections.abc import Mapping
@@ -54,10 +57,16 @@ OBSERVATION_SLICES: dict[str, Component] = {
   "force_torque": _component((53, 59), unit="tanh", privileged=False),
 }
 
+CAMERA_PREFIX = "camera/"
 SUCCESS_PREFIX = "success/"
 CONDITION_PREFIX = "condition/"
 REWARD_PREFIX = "reward/"  # of a task; see `acting/environments.py`
 
+
+# What a robot senses by itself.
+PROPRIOCEPTION = tuple(
+  name for name, part in OBSERVATION_SLICES.items() if not part.privileged
+)
 
 # The components one after the other: where each starts and ends, where in the
 # 59 each of its floats is, and the way back.
@@ -85,11 +94,14 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
     observation: a timestep's observation with all eleven components.
 
   Returns:
-    float32 [59].
+    float32 [59]; of vision, which leaves the privileged ones out, see
+    `flatten_vision`.
 
   Raises:
-    KeyError: a component is missing (vision leaves the privileged ones out).
+    KeyError: a component is missing.
   """
+  if not has_state(observation) and any(map(_is_camera, observation)):
+    return flatten_vision(observation)
   try:
     parts = [observation[name] for name in _BOUNDS]
   except KeyError as error:
@@ -98,6 +110,22 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
       f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
     ) from None
   return np.concatenate(parts, dtype=np.float32)[_FLAT]
+
+
+def has_state(observation: Mapping[str, np.ndarray]) -> bool:
+  """Whether all eleven components are there, the privileged ones too."""
+  return OBSERVATION_SLICES.keys() <= observation.keys()
+
+
+def flatten_vision(observation: Mapping[str, np.ndarray]) -> np.ndarray:
+  """What the robot senses, then the pixels, float32 [18 + C H W 3]."""
+  parts = [*map(observation.__getitem__, PROPRIOCEPTION)]
+  parts += [np.ravel(v) for k, v in observation.items() if _is_camera(k)]
+  return np.concatenate(parts, dtype=np.float32)
+
+
+def _is_camera(name: str) -> bool:
+  return name.startswith(CAMERA_PREFIX)
 
 
 def successes(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:

@@ -12,6 +12,7 @@ ONE = {
   "OMP_NUM_THREADS": "1",
   "MKL_NUM_THREADS": "1",
   "OPENBLAS_NUM_THREADS": "1",
+  "LP_NUM_THREADS": "0",  # of Mesa's software GL
   **_PASSIVE,
 }
 

@@ -5,6 +5,7 @@ Shapes are written `[B, K, A]`:
   A: action dimensions (4).      O: observation dimensions (59).
   N: stored pairs or rows.       H: hidden units.
   T: control steps.              R: tasks whose rewards the replay keeps.
+  Frames are [C, H, W, 3]: cameras, pixels' rows and columns, colours.
 
 Units are SI (m, m/s, rad/s, N, N m); quaternions are w x y z.
 """

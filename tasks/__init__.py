@@ -16,7 +16,7 @@ __all__ = ["load"]
 
 _CHOICES = {
   "reward": ("sparse", "dense"),
-  "observations": ("features", "vision"),
+  "observations": ("features", "vision", "all"),
   "spawn": ("published", "full_tray"),
   "control_hz": CONTROL_RATES,
   "show_rewards": (False, True),
@@ -29,6 +29,7 @@ def load(
   *,
   reward: str = "sparse",
   observations: str = "features",
+  camera_size: int = 64,
   spawn: str = "published",
   control_hz: int = 20,
   time_limit: float = 18.0,
@@ -42,8 +43,10 @@ def load(
     seed: of the environment's random state; None takes one from the system.
     reward: "sparse" (1 while the task's condition holds, else 0) or "dense"
       (the sum of the task's named terms).
-    observations: "features" (the eleven components) or "vision" (a camera,
-      84 x 84, and the components that a real robot senses).
+    observations: "features" (the eleven components), "vision" (frames of a
+      front and a wrist camera, uint8, and the components that a real robot
+      senses) or "all".
+    camera_size: a frame's height and width in pixels, 32 to 480.
     spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
     control_hz: 20, 10 or 5 control steps a second.
     time_limit: length of an episode, s.
@@ -52,7 +55,7 @@ def load(
 
   Raises:
     ValueError: an unknown name or a value out of range, with the valid ones;
-      vision where no pictures can be made.
+      frames where no pictures can be made.
   """
   given = {**locals()}
   del given["seed"], given["unknown"]
@@ -66,8 +69,12 @@ def load(
     raise ValueError(f"unknown option {', '.join(unknown)}; valid: {valid}")
   for name, choices in _CHOICES.items():
     _check(name, given[name], choices)
-  if observations == "vision" and (fault := graphics.fault()):
-    raise ValueError(fault)
+  if not 32 <= camera_size <= 480:
+    raise ValueError(f"camera_size is {camera_size!r}; valid: 32 to 480")
+  if observations != "features":
+    graphics.allow_pictures()
+    if fault := graphics.fault():
+      raise ValueError(fault)
   if not time_limit * control_hz >= 1:
     raise ValueError(
       f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
@@ -75,7 +82,8 @@ def load(
   play = PlayTask(
     task,
     is_dense=reward == "dense",
-    has_camera=observations == "vision",
+    shown=observations,
+    camera_size=camera_size,
     spawn=spawn,
     control_hz=control_hz,
     show_rewards=show_rewards,

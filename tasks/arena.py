@@ -1,9 +1,9 @@
 """The room around the robot: table, light, sky and cameras."""
 
-import numpy as np
 from dm_control import composer
 
 from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.rotations import look_at
 
 _PHYSICS_STEP = 0.005  # s
 _TABLE_HALF = (0.5, 0.75)  # m
@@ -48,7 +48,7 @@ class PlayArena(composer.Arena):
     )
     for name, eye, target, fovy in _CAMERAS:
       root.worldbody.add(
-        "camera", name=name, pos=eye, xyaxes=_look_at(eye, target), fovy=fovy
+        "camera", name=name, pos=eye, xyaxes=look_at(eye, target), fovy=fovy
       )
 
   def _set_physics(self, root) -> None:
@@ -94,13 +94,3 @@ class PlayArena(composer.Arena):
         castshadow=castshadow,
         directional=False,
       )
-
-
-def _look_at(eye, target) -> np.ndarray:
-  """A camera's x and y axes when it looks from `eye` at `target`, float [6]."""
-  backwards = np.subtract(eye, target)
-  right = np.cross((0.0, 0.0, 1.0), backwards)
-  up = np.cross(backwards, right)
-  return np.concatenate(
-    [right / np.linalg.norm(right), up / np.linalg.norm(up)]
-  )

@@ -7,15 +7,15 @@ import numpy as np
 from dm_control.composer.observation import observable
 
 from lfgp_dmc.observations import (
+  CAMERA_PREFIX,
   CONDITION_PREFIX,
   OBSERVATION_SLICES,
   REWARD_PREFIX,
   SUCCESS_PREFIX,
 )
-from lfgp_dmc.tasks.arena import FRONT_CAMERA, PlayArena
+from lfgp_dmc.tasks.cameras import Cameras
 from lfgp_dmc.tasks.goals import GOALS
 
-_CAMERA = "camera/" + FRONT_CAMERA
 _FLAGS = [p + n for p in (SUCCESS_PREFIX, CONDITION_PREFIX) for n in GOALS]
 _VALUES = (np.array(False), np.array(True))
 for _value in _VALUES:
@@ -25,14 +25,15 @@ for _value in _VALUES:
 def make(
   published: Mapping[str, np.ndarray],
   read_reward: Callable[..., np.ndarray],
-  arena: PlayArena,
-  has_camera: bool,
+  cameras: Cameras,
+  shown: str,
   show_rewards: bool,
 ) -> dict[str, observable.Observable]:
   """Makes all observables; those that were not chosen are disabled.
 
   Components and flags come from `published`, dense rewards from
-  `read_reward(task, physics)`. The camera takes the place of privileged parts.
+  `read_reward(task, physics)`. With `shown` "vision", frames take the place of
+  privileged parts; with "all" they come beside them.
   """
   made: dict[str, observable.Observable] = {}
 
@@ -41,16 +42,16 @@ def make(
     made[name] = value
 
   for name, component in OBSERVATION_SLICES.items():
-    is_hidden = has_camera and component.privileged
+    is_hidden = shown == "vision" and component.privileged
     add(name, _Published(published, name), not is_hidden)
   for name in _FLAGS:
     add(name, _Published(published, name), True)
   for name in GOALS:
     reward = observable.Generic(functools.partial(read_reward, name))
     add(REWARD_PREFIX + name, reward, show_rewards)
-  camera = arena.mjcf_model.find("camera", FRONT_CAMERA)
-  pictures = observable.MJCFCamera(camera, height=84, width=84)
-  add(_CAMERA, pictures, has_camera)
+  for name in cameras.names:
+    frames = observable.Generic(functools.partial(cameras.frame, name))
+    add(CAMERA_PREFIX + name, frames, shown != "features")
   return made
 
 

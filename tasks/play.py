@@ -12,6 +12,7 @@ from lfgp_dmc.task_names import MAIN_TASKS
 from lfgp_dmc.tasks import control, initialisers, observables
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.arena import PlayArena
+from lfgp_dmc.tasks.cameras import Cameras
 from lfgp_dmc.tasks.entities import panda_links
 from lfgp_dmc.tasks.goals import GOALS, terms
 from lfgp_dmc.tasks.holds import Holds
@@ -36,7 +37,8 @@ class PlayTask(composer.Task):
     main_task: str,
     *,
     is_dense: bool,
-    has_camera: bool,
+    shown: str,
+    camera_size: int,
     spawn: str,
     control_hz: int,
     show_rewards: bool,
@@ -50,9 +52,9 @@ class PlayTask(composer.Task):
     self.blocks_out = 0
     self.control_timestep = 1.0 / control_hz
     self._published: dict[str, np.ndarray] = {}
-    arena, reward = self.world.arena, self._read_reward
+    cameras = Cameras(self.world.cameras, camera_size)
     self._observables = observables.make(
-      self._published, reward, arena, has_camera, show_rewards
+      self._published, self._read_reward, cameras, shown, show_rewards
     )
 
   @property

@@ -1,4 +1,4 @@
-"""Rotations of a cube, modulo its 24 symmetries."""
+"""Rotations: of a cube, modulo its 24 symmetries, and of cameras."""
 
 import itertools
 
@@ -45,3 +45,13 @@ def reduce_rotation(quat: np.ndarray) -> np.ndarray:
   best = _SYMMETRIES[np.argmax(cosines.round(9), axis=-1)]
   reduced = (best @ quat[..., None])[..., 0]
   return np.where(reduced[..., :1] < 0, -reduced, reduced)
+
+
+def look_at(eye, target, up=(0.0, 0.0, 1.0)) -> np.ndarray:
+  """A camera's x and y axes when it looks from `eye` at `target`, float [6]."""
+  backwards = np.subtract(eye, target)
+  right = np.cross(up, backwards)
+  above = np.cross(backwards, right)
+  return np.concatenate(
+    [right / np.linalg.norm(right), above / np.linalg.norm(above)]
+  )

@@ -2,7 +2,7 @@
 
 from lfgp_dmc.tasks import contacts
 from lfgp_dmc.tasks import workspace as ws
-from lfgp_dmc.tasks.arena import PlayArena
+from lfgp_dmc.tasks.arena import FRONT_CAMERA, PlayArena
 from lfgp_dmc.tasks.control import SetPointControl
 from lfgp_dmc.tasks.entities import Block, Panda, Tray, Zone
 from lfgp_dmc.tasks.features import FeatureReader
@@ -29,6 +29,8 @@ class World:
       self.arena.attach(entity)
     self.arena.add_free_entity(self.blue)
     self.arena.add_free_entity(self.green)
+    front = self.arena.mjcf_model.find("camera", FRONT_CAMERA)
+    self.cameras = {FRONT_CAMERA: front, "wrist": self.panda.camera}
     contacts.add_pairs(self.arena, self.panda, self.blue, self.green, self.tray)
     self.control = SetPointControl(self.arena.mjcf_model, self.panda)
     self.reader = FeatureReader(self.panda, self.blue, self.green, self.tray)

@@ -1,6 +1,7 @@
 """What many tests share: a folder of their own, demonstrations, a toy agent."""
 
 import contextlib
+import dataclasses
 import pathlib
 import resource
 import tempfile
@@ -8,6 +9,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from absl.testing import absltest, parameterized
+from dm_env import specs
 
 from lfgp_dmc import toy
 from lfgp_dmc.data import csv_files
@@ -54,6 +56,37 @@ def demonstrations(*lengths: int) -> Demonstrations:
     is_last,
     ATTRIBUTES,
   )
+
+
+def with_frames(data: Demonstrations, size: int = 20) -> Demonstrations:
+  """Noise to be seen beside the pairs, by two cameras."""
+  rows = len(data) + len(np.unique(data.episode))
+  random = np.random.default_rng(1)
+  frames = random.integers(256, size=(rows, 2, size, size, 3), dtype=np.uint8)
+  return dataclasses.replace(data, frames=frames)
+
+
+class SeenPoint(toy.PointEnvironment):
+  """The toy world by camera: where the point is can only be seen."""
+
+  def observation_spec(self):
+    _, *tasks = super().observation_spec().items()
+    return {
+      "clock": specs.Array((1,), np.float32),
+      **dict(tasks),
+      "camera/above": specs.Array((32, 32, 3), np.uint8),
+    }
+
+  def _observe(self):
+    position, *tasks = super()._observe().items()
+    frame = np.zeros((32, 32, 3), np.uint8)
+    column, row = ((position[1] + 1) * 14).astype(int)
+    frame[row : row + 3, column : column + 3] = 255
+    clock = np.array([self._steps / 20], np.float32)
+    return {"clock": clock, **dict(tasks), "camera/above": frame}
+
+  def clear_success(self):
+    self._done = dict.fromkeys(toy.TASKS, False)
 
 
 @contextlib.contextmanager

@@ -12,11 +12,13 @@ from lfgp_dmc import seeding
 from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.bc.config import BcConfig
 from lfgp_dmc.agents.bc.pairs import SplitPairs
+from lfgp_dmc.agents.bc.pixel_pairs import PixelPairs
 from lfgp_dmc.agents.cloning import IntentionCloner, cloning_loss
 from lfgp_dmc.agents.demonstration_pool import make_standardiser
 from lfgp_dmc.agents.metering import Meter
 from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
 from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
@@ -72,7 +74,7 @@ class BcAgent:
 
   def update(self) -> None:
     """Makes one update, on the epoch's next batch."""
-    batch = self._pairs.batch(self._order.pop())
+    batch = self._pairs.batch(self._order.pop(), self._shuffling)
     self._meter.add(self._cloner.update(batch))
 
   def end_epoch(self) -> None:
@@ -156,19 +158,32 @@ def build(
   action_size: int,
   *,
   bfloat16: bool = False,
+  frame_shape: Sequence[int] = (),
   **unused: object,
 ) -> BcAgent:
   """Builds a BC agent; arguments as of `agents.lfgp.build`, the replay unused.
+
+  With frames, [C, H, W, 3] each, observations are what comes before the pixels.
 
   Raises:
     ValueError: demonstrations are missing, too few, or of other sizes.
   """
   del replay, unused
   device = torch.device(device)
-  standardiser = make_standardiser(
-    config.inputs, demonstrations, tasks, observation_size, action_size
-  ).to(device)
+  dtype = torch.bfloat16 if bfloat16 else torch.float32
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
+  encoder, seen = None, config.encoder
+  if frame_shape:
+    sizes = seen.features, seen.channels
+    encoder = Encoder(frame_shape, *sizes, initial).to(device)
+  standardiser = make_standardiser(
+    config.inputs,
+    demonstrations,
+    tasks,
+    observation_size,
+    action_size,
+    seen.features if frame_shape else 0,
+  ).to(device)
   network = layouts.make_intentions(
     config.networks.layout,
     standardiser,
@@ -176,9 +191,13 @@ def build(
     config.networks.hidden_size,
     action_size,
     initial,
+    encoder=encoder,
   ).to(device)
   split, share = seeding.generator(seed, "split"), config.validation_share
-  pairs = SplitPairs(demonstrations, tasks, standardiser, share, split)
+  which = demonstrations, tasks, standardiser, share, split
+  if encoder is None:
+    pairs = SplitPairs(*which)
+  else:
+    pairs = PixelPairs(*which, encoder, seen.shift, dtype)
   shuffling = seeding.generator(seed, "shuffling")
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
   return BcAgent(config, tasks, network, pairs, shuffling, dtype)

@@ -11,6 +11,7 @@ from lfgp_dmc.agents.fields import (
   ProperShare,
   checked,
 )
+from lfgp_dmc.agents.vision import EncoderConfig
 
 
 @checked
@@ -18,6 +19,7 @@ class BcConfig:
   """Defaults are the paper's hyper-parameter table for BC algorithms."""
 
   inputs: InputsConfig = InputsConfig()
+  encoder: EncoderConfig = EncoderConfig()
   networks: NetworksConfig = NetworksConfig(layout="separate")
   optimiser: OptimiserConfig = OptimiserConfig(max_gradient_norm=0.0)
   loss: Literal["squared_error", "likelihood"] = "squared_error"

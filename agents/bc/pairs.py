@@ -35,12 +35,12 @@ class SplitPairs:
     if few:
       raise ValueError(f"fewer than 2 pairs of {', '.join(few)}: no split")
     self._device = device = standardiser.mean.device
-    inputs, actions, offset = [], [], 0
+    observations, actions, offset = [], [], 0
     self.train_rows: list[np.ndarray] = []  # of the pool, by task
     self.validation_rows: list[np.ndarray] = []
     for task in tasks:
       part = demonstrations[task]
-      inputs.append(standardiser(_tensor(part.observation, device)))
+      observations.append(_tensor(part.observation, device))
       actions.append(_tensor(part.action, device))
       size = len(part.action)
       held_out = min(max(round(validation_share * size), 1), size - 1)
@@ -48,7 +48,12 @@ class SplitPairs:
       self.validation_rows.append(np.sort(rows[:held_out]))
       self.train_rows.append(np.sort(rows[held_out:]))
       offset += size
-    self._inputs, self._action = torch.cat(inputs), torch.cat(actions)
+    self._action = torch.cat(actions)
+    self._inputs = self._prepared(torch.cat(observations), standardiser)
+
+  def _prepared(self, observation, standardiser: Standardiser) -> torch.Tensor:
+    """What is kept of observations [N, O]."""
+    return standardiser(observation)
 
   def shuffled(
     self, generator: np.random.Generator, batch_size: int
@@ -68,8 +73,10 @@ class SplitPairs:
     index = torch.from_numpy(order.swapaxes(0, 1).copy())
     return index.to(self._device)
 
-  def batch(self, rows: torch.Tensor) -> ExpertBatch:
-    """Gathers rows [K, B] of the pool."""
+  def batch(
+    self, rows: torch.Tensor, generator: np.random.Generator | None = None
+  ) -> ExpertBatch:
+    """Gathers rows [K, B] of the pool; `generator` is for augmentation."""
     return ExpertBatch(_gather(self._inputs, rows), _gather(self._action, rows))
 
   def validation(self, index: int) -> ExpertBatch:

@@ -56,7 +56,7 @@ class LfgpAgent:
   def start_from(self, policy: Policy) -> None:
     """Lets the intentions start as those of a policy, by task name.
 
-    Its trunk and standardisation come along.
+    Its trunk and standardisation come along, its std as after pretraining.
 
     Raises:
       ValueError: it has other sizes, or none of our tasks.
@@ -69,6 +69,8 @@ class LfgpAgent:
       policy.tasks,
       "the policy",
     )
+    if std := self._pretraining.config.std:
+      self.learner.networks.intentions.heads.set_std(std)
     self._refresh_inputs()
 
   def carry_over(

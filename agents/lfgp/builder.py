@@ -25,6 +25,7 @@ from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
 from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.schedulers import make_scheduler
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
@@ -42,15 +43,20 @@ def build(
   *,
   bfloat16: bool = False,
   cuda_graphs: bool = True,
+  encoder: Encoder | None = None,
+  **unused: object,
 ) -> LfgpAgent:
   """Builds an LfGP agent; all its random numbers follow from the seed.
 
   The replay is filled by the training loop. With `bfloat16`, parameters stay
-  float32; with `cuda_graphs`, a GPU records updates, then replays them.
+  float32; with `cuda_graphs`, a GPU records updates, then replays them. From
+  pixels, the frozen `encoder` has made the features of all observations, and is
+  stored with the intentions.
 
   Raises:
     ValueError: demonstrations, stored rewards or scheduler do not fit.
   """
+  del unused
   device = torch.device(device)
   dtype = torch.bfloat16 if bfloat16 else torch.float32
   random = functools.partial(seeding.generator, seed)
@@ -63,7 +69,7 @@ def build(
     experts = ExpertPool(used, tasks, standardiser, config.final_rows)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
-    config, len(tasks), action_size, standardiser, initial, device
+    config, len(tasks), action_size, standardiser, initial, device, encoder
   )
   noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
   columns = replay.reward_columns(tasks) if config.keeps_rewards else []

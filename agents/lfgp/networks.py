@@ -13,6 +13,7 @@ from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, LfgpConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork
 from lfgp_dmc.agents.networks.discriminator import Discriminator
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
@@ -54,8 +55,9 @@ def make_networks(
   standardiser: Standardiser,
   generator: torch.Generator,
   device: torch.device,
+  encoder: Encoder | None = None,
 ) -> LfgpNetworks:
-  """Draws all networks from a CPU generator."""
+  """Draws all networks from a CPU generator; a given encoder goes along."""
   own = config.networks
   sizes = (tasks, own.hidden_size, actions, generator)
   critics = layouts.make_critics(
@@ -63,7 +65,7 @@ def make_networks(
   ).to(device)
   trunk = critics.trunk if own.actor_trunk == "shared" else None
   intentions = layouts.make_intentions(
-    own.layout, standardiser, *sizes, trunk
+    own.layout, standardiser, *sizes, trunk, encoder
   ).to(device)
   initial = torch.tensor(config.intention.initial_temperature).log()
   networks = LfgpNetworks(

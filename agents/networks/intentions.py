@@ -6,6 +6,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
@@ -67,7 +68,7 @@ def to_std(raw: torch.Tensor) -> torch.Tensor:
 
 
 class IntentionNetwork(nn.Module):
-  """All that acting needs: standardisation, trunk, heads."""
+  """All that acting needs: standardisation, trunk, heads, any encoder."""
 
   def __init__(
     self,
@@ -75,9 +76,11 @@ class IntentionNetwork(nn.Module):
     trunk: nn.Module,
     heads: IntentionHeads,
     owns_trunk: bool,
+    encoder: Encoder | None = None,
   ):
     """Without `owns_trunk`, the trunk is the critics': they alone train it."""
     super().__init__()
+    self.encoder = encoder
     self.standardiser = standardiser
     self.trunk = trunk
     self.heads = heads
@@ -86,7 +89,12 @@ class IntentionNetwork(nn.Module):
   def trained_parameters(self) -> list[nn.Parameter]:
     """The parameters that the intentions' losses train."""
     trunk = list(self.trunk.parameters()) if self.owns_trunk else []
-    return [*trunk, *self.heads.parameters()]
+    seen = self.encoder.parameters() if self.encoder is not None else ()
+    return [
+      *trunk,
+      *self.heads.parameters(),
+      *(p for p in seen if p.requires_grad),
+    ]
 
   def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
     """Mean and std [K, B, A] for inputs [B, O] or [K, B, O]."""

@@ -10,6 +10,7 @@ import torch
 from torch import nn
 
 from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
+from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
 from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
 
@@ -24,13 +25,15 @@ def make_intentions(
   actions: int,
   generator: torch.Generator,
   critics_trunk: nn.Module | None = None,
+  encoder: Encoder | None = None,
 ) -> IntentionNetwork:
   """Draws K intentions, with a trunk of their own or the critics'."""
   inputs = standardiser.input_size
   trunk = critics_trunk or _make_trunk(layout, inputs, hidden, generator)
   features, layers = _of_heads(layout, inputs, hidden)
   heads = IntentionHeads(tasks, features, hidden, actions, generator, layers)
-  return IntentionNetwork(standardiser, trunk, heads, critics_trunk is None)
+  owns_trunk = critics_trunk is None
+  return IntentionNetwork(standardiser, trunk, heads, owns_trunk, encoder)
 
 
 def make_critics(

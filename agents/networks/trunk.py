@@ -30,11 +30,15 @@ class Standardiser(nn.Module):
     self.register_buffer("deviation", torch.ones(size))
 
   def fit(self, observation: np.ndarray) -> None:
-    """Takes mean and std, at least 0.01, from demonstrations [N, O]."""
+    """Takes mean and std, at least 0.01, from demonstrations [N, O].
+
+    Of fewer floats than O, the others (an encoder's features) stay as they are.
+    """
+    size = observation.shape[1]
     mean = observation.mean(0, dtype=np.float64)
     std = np.maximum(observation.std(0, dtype=np.float64), _STD_FLOOR)
-    self.mean.copy_(torch.from_numpy(mean))
-    self.deviation.copy_(torch.from_numpy(std))
+    self.mean[:size].copy_(torch.from_numpy(mean))
+    self.deviation[:size].copy_(torch.from_numpy(std))
 
   def forward(self, observation: torch.Tensor) -> torch.Tensor:
     """Returns [..., input_size]: standardised, then tanh features."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 import lfgp_dmc
+from lfgp_dmc import graphics
 
 _TASK = "stack"
 _RESETS = 20
@@ -18,7 +19,8 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
     `control_steps_per_s`: through the dm_env interface with uniform random
     actions, resets and `flatten` included. `mj_step_per_s`: control steps'
     worth of `mj_step` alone, on scripted actions, resets apart.
-    `mj_step_fraction`: the first over the second. `reset_ms`.
+    `mj_step_fraction`: the first over the second. `reset_ms`. Where pictures
+    can be made, `vision_steps_per_s`: the first with both cameras' frames.
   """
   environment = lfgp_dmc.load(_TASK, seed=seed)
   played = steps / _random_play(environment, steps, seed)
@@ -31,6 +33,11 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
     environment.reset()
   yield "reset_ms", 1000 * (time.perf_counter() - start) / _RESETS
   environment.close()
+  graphics.allow_pictures()
+  if not graphics.fault():
+    environment = lfgp_dmc.load(_TASK, seed, observations="vision")
+    yield "vision_steps_per_s", steps / _random_play(environment, steps, seed)
+    environment.close()
 
 
 def _random_play(environment, steps: int, seed: int) -> float:

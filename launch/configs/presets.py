@@ -87,6 +87,21 @@ _FAST_PRECISE: dict[str, Any] = {
   "agent.scheduler.xi": 90,
 }
 
+# From pixels. Cloning comes first (bc, multitask_bc); acting agents take its
+# encoder and start as it left off (init_from). Their observations are what the
+# robot senses, 18 floats, and features, which are standardised already.
+_PIXELS: dict[str, Any] = {
+  **_FAST,
+  "camera_size": 64,
+  "env_steps": 40_000,
+  "evaluate_every": 10_000,
+  "replay_capacity": 100_000,
+  "agent.batch_size": 64,
+  "agent.learning_rate": 1e-3,
+  "agent.pretraining.updates": 0,
+  "agent.reward.masked": "3:6,8:18",
+}
+
 # For 10 to 20 attempts a task: every attempt counts as its images and shifted
 # copies too; discriminators see relative positions, heights and fingers, which
 # no few attempts make recognisable by place, and are sharp enough to tell
@@ -141,6 +156,7 @@ PRESETS: dict[str, dict[str, Any]] = {
   "fast": _FAST,
   "fast_precise": _FAST_PRECISE,
   "few": _FEW,
+  "pixels": _PIXELS,
 }
 
 # What a main task changes of a preset: half a millimetre decides Insert.

@@ -47,6 +47,8 @@ class RunConfig:
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: Text = ""
   control_hz: PositiveInt = 20  # of the block tasks: 20, 10 or 5 steps a second
+  # From pixels: the side of the block tasks' frames; 0: from the 59 floats.
+  camera_size: Count = 0
   episode_steps: Count = 0  # at most; 0: 18 s
 
   # Acting and updates; not of behaviour cloning.
@@ -113,6 +115,21 @@ class RunConfig:
         f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
         f"pairs_per_task={self.pairs_per_task}"
       )
+    if self.camera_size and self.mirror_demonstrations:
+      yield (
+        "mirror_demonstrations is True; valid: False with camera_size (frames "
+        "have no mirror image)"
+      )
+    if self.camera_size and self.shifted_copies:
+      yield (
+        f"shifted_copies is {self.shifted_copies}; valid: 0 with camera_size "
+        "(frames cannot be shifted so)"
+      )
+    if self.camera_size and self.transfer_from:
+      yield (
+        f"transfer_from is {self.transfer_from!r}; valid: nothing with "
+        "camera_size (its features would be another encoder's)"
+      )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"
@@ -132,7 +149,9 @@ class RunConfig:
   @property
   def environment_spec(self) -> EnvironmentSpec:
     """Where the agent acts."""
-    return EnvironmentSpec(self.main_task, self.environment, self.control_hz)
+    return EnvironmentSpec(
+      self.main_task, self.environment, self.control_hz, self.camera_size
+    )
 
   @property
   def most_episode_steps(self) -> int:

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import dm_env
 import numpy as np
 
-from lfgp_dmc import seeding
+from lfgp_dmc import observations, seeding
 from lfgp_dmc.acting import rollout
 from lfgp_dmc.acting.environments import has_succeeded, is_physics_failure
-from lfgp_dmc.types import Actor, Transition
+from lfgp_dmc.types import Actor, Step, Transition
 
 LIMIT = 90  # steps of an attempt at 20 Hz (the released code's)
 # Unstack-Stack's is the authors' later setting. The others are ours: Bring's
@@ -47,6 +47,8 @@ class CollectionPlan:
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
   # Of so many reset-based attempts the longest: hard starts are over-sampled.
   keep_longest_of: int = 1
+  # [C, H, W, 3], if pairs consist of what a robot senses and of frames.
+  frame_shape: tuple[int, ...] = ()
 
   def steps(self, at_20_hz: int) -> int:
     """Control steps of as much time, rounded up."""
@@ -66,6 +68,7 @@ class Attempt(NamedTuple):
 
   task: str
   rows: Transition | None  # arrays [T, ...]; None unless it succeeded
+  frames: np.ndarray | None = None  # uint8 [T + 1, C, H, W, 3]
 
 
 class Collector:
@@ -114,7 +117,7 @@ class Collector:
     stored = before if task == CLOSE else []
     self._actor.begin(task, seeding.derive(seed, "actor"))
     timestep, success = self._run(timestep, task, plan.limit(task), stored)
-    return Attempt(task, _stacked(stored) if success else None)
+    return self._stacked(task, stored) if success else Attempt(task, None)
 
   def _lead(self, task: str, random: np.random.Generator) -> str | None:
     """The task that is played first, if any."""
@@ -155,7 +158,7 @@ class Collector:
       timestep, success = self._run(timestep, task, min(limit, left), steps)
       left -= len(steps)
       if success:
-        attempts.append(Attempt(task, _stacked(steps)))
+        attempts.append(self._stacked(task, steps))
       elif len(steps) == limit:
         attempts.append(Attempt(task, None))
     return attempts
@@ -175,10 +178,10 @@ class Collector:
     success = False
     played = rollout.steps(self._environment, timestep, self._actor.act)
     for step in itertools.islice(played, limit):
-      timestep = step.timestep
+      before, timestep = timestep, step.timestep
       if is_physics_failure(timestep):
         return timestep, False
-      stored.append(step.transition)
+      stored.append(self._seen(before, step))
       success = stop and bool(has_succeeded(timestep, task))
       if success:
         break
@@ -193,6 +196,24 @@ class Collector:
       self._environments[task] = self._plan.make_environment(task)
     self._environment = self._environments[task]
 
+  def _seen(self, before: dm_env.TimeStep, step: Step) -> Transition:
+    """What is stored of a step: the expert may have seen more than a robot."""
+    seen = step.timestep.observation
+    if not (self._plan.frame_shape and observations.has_state(seen)):
+      return step.transition
+    first, second = map(observations.flatten_vision, (before.observation, seen))
+    return Transition(first, step.transition.action, second)
 
-def _stacked(steps: Sequence[Transition]) -> Transition:
-  return Transition(*(np.stack(part) for part in zip(*steps, strict=True)))
+  def _stacked(self, task: str, steps: Sequence[Transition]) -> Attempt:
+    """The success; frames, of which neighbours share one, apart."""
+    observed, actions, after = zip(*steps, strict=True)
+    action, shape = np.stack(actions), self._plan.frame_shape
+    if not shape:
+      return Attempt(
+        task, Transition(np.stack(observed), action, np.stack(after))
+      )
+    states = np.stack([*observed, after[-1]])  # [T + 1, ...]
+    floats = states.shape[1] - math.prod(shape)
+    own = states[:, :floats].copy()  # no view: the pixels are to go
+    frames = states[:, floats:].astype(np.uint8).reshape(-1, *shape)
+    return Attempt(task, Transition(own[:-1], action, own[1:]), frames)

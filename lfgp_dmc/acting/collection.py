@@ -21,6 +21,7 @@ from lfgp_dmc.acting import workers as work
 from lfgp_dmc.acting.attempts import Attempt, CollectionPlan, Collector, Job
 from lfgp_dmc.data.demonstration_checks import COLLECTIONS
 from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.frame_files import FrameFile
 from lfgp_dmc.types import Transition
 
 _CHUNK = 8  # reset-based attempts a job
@@ -80,7 +81,8 @@ def collect(
       )
   if attempts:
     pairs, finals = 0, attempts
-  piles = {task: _Pile(task, pairs, finals, attempts > 0) for task in tasks}
+  shape, whole = plan.frame_shape, attempts > 0
+  piles = {task: _Pile(task, pairs, finals, whole, shape) for task in tasks}
   total = (pairs + finals) * len(piles)
   unit = "attempt" if attempts else "pair"
   with progress_bars.bar(total=total, unit=unit, show=progress) as bar:
@@ -99,7 +101,8 @@ def _fill(
   """Fills the piles, one unit of work (a task, or play) after the other."""
   left = list(units)
   make = functools.partial(Collector, plan)
-  with contextlib.closing(work.ordered(make, _jobs(left), workers)) as results:
+  results = work.ordered(make, _jobs(left), workers, bool(plan.frame_shape))
+  with contextlib.closing(results):
     for unit in units:
       wanted = piles if unit is None else {unit: piles[unit]}
       bar.set_description_str(unit or "play")
@@ -127,12 +130,13 @@ def _jobs(units: list[str | None]) -> Iterator[Job]:
 class _Pile:
   """The pairs of one task so far."""
 
-  def __init__(self, task: str, pairs: int, finals: int, whole: bool):
+  def __init__(self, task: str, pairs: int, finals: int, whole: bool, shape):
     """The finals' attempts are kept whole, or their rows of success alone."""
     self._whole = whole
     self._task, self._pairs, self._finals = task, pairs, finals
     self._wanted = pairs + finals
     self._rows: list[Transition] = []
+    self._frames = FrameFile(shape) if shape else None
     self._stored = self._attempts = self._failures = 0
 
   @property
@@ -155,15 +159,21 @@ class _Pile:
         )
       return 0
     self._failures = 0
-    before = self._stored
-    if before < self._pairs:
+    length = len(attempt.rows.action)
+    if self._stored < self._pairs:
+      kept = slice(0, min(length, self._pairs - self._stored))
       self._rows.append(attempt.rows)
-      self._stored = min(before + len(attempt.rows.action), self._pairs)
     else:
-      first = 0 if self._whole else -1
-      self._rows.append(Transition(*(part[first:] for part in attempt.rows)))
-      self._stored += 1
-    return self._stored - before
+      kept = slice(0 if self._whole else length - 1, length)
+      self._rows.append(
+        Transition(*(part[kept.start :] for part in attempt.rows))
+      )
+    if self._frames is not None:
+      assert attempt.frames is not None, "the plan has frames"
+      self._frames.append(attempt.frames[kept.start : kept.stop + 1])
+    added = kept.stop if self._stored < self._pairs else 1
+    self._stored += added
+    return added
 
   def collected(self) -> Collected:
     """The pairs, the last attempt cut; then the extra finals."""
@@ -184,6 +194,7 @@ class _Pile:
         next_observation[kept],
         episode[kept],
         is_last[kept],
+        frames=None if self._frames is None else self._frames.mapped(),
       ),
       self._attempts,
       len(self._rows),

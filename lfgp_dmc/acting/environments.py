@@ -1,11 +1,13 @@
 """How any dm_env environment is read and driven: flat rows, widths, rewards.
 
 Our nine tasks are laid out in the order of `observations.py`, every other
-environment's floating-point observables in the order of its specification. What
-belongs to tasks (`success/`, `condition/`, `reward/`) is never an input. Agents
-act in [-1, 1]: see `with_unit_actions`.
+environment's floating-point observables in the order of its specification, and
+then its frames: `camera/NAME`, uint8 [H, W, 3], of one size. What belongs to
+tasks (`success/`, `condition/`, `reward/`) is never an input. Agents act in
+[-1, 1]: see `with_unit_actions`.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -20,6 +22,8 @@ TASK_PREFIXES = (
   observations.CONDITION_PREFIX,
   observations.REWARD_PREFIX,
 )
+
+_FEATURES = "features"
 
 Flattener = Callable[[Any], np.ndarray]
 
@@ -44,6 +48,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
+  names += filter(_is_frame, spec)
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -55,6 +60,24 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     return np.concatenate(parts, dtype=np.float32)
 
   return flatten
+
+
+def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
+  """[C, H, W, 3] of the cameras' frames; empty without cameras.
+
+  Raises:
+    ValueError: frames are not uint8 [H, W, 3], or of several sizes.
+  """
+  spec: Any = environment.observation_spec()
+  names = spec if isinstance(spec, Mapping) else ()
+  found = [spec[name] for name in filter(_is_frame, names)]
+  kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
+  if not kinds:
+    return ()
+  (shape, dtype), *others = kinds
+  if others or dtype != "uint8" or shape[2:] != (3,):
+    raise ValueError(f"frames are {kinds}; valid: uint8 [H, W, 3] of one size")
+  return (len(found), *shape)
 
 
 def with_unit_actions(environment: dm_env.Environment) -> dm_env.Environment:
@@ -100,6 +123,58 @@ class _UnitActions:
     return self._environment.step(scaled.astype(self._spec.dtype))
 
 
+def with_features(
+  environment: dm_env.Environment, encode: Callable[[np.ndarray], np.ndarray]
+) -> dm_env.Environment:
+  """The environment, with the observable `features` in the place of frames.
+
+  `encode` maps frames uint8 [N, C, H, W, 3] to float32 [N, F].
+  """
+  made: Any = _Features(environment, encode)
+  return made
+
+
+class _Features:
+  """An environment whose frames are encoded; all else is its own."""
+
+  def __init__(self, environment: Any, encode):
+    self._environment, self._encode = environment, encode
+
+  def __getattr__(self, name: str) -> Any:
+    if name.startswith("__"):
+      raise AttributeError(name)
+    return getattr(self._environment, name)
+
+  def observation_spec(self) -> dict[str, specs.Array]:
+    """The environment's own, without frames, with `features`."""
+    spec = self._environment.observation_spec()
+    frames = np.zeros((1, *frame_shape(self._environment)), np.uint8)
+    kept = {name: part for name, part in spec.items() if not _is_frame(name)}
+    shape = self._encode(frames)[0].shape
+    return {**kept, _FEATURES: specs.Array(shape, np.float32, _FEATURES)}
+
+  def reset(self) -> dm_env.TimeStep:
+    """Starts an episode."""
+    return self._encoded(self._environment.reset())
+
+  def step(self, action: np.ndarray) -> dm_env.TimeStep:
+    """One step."""
+    return self._encoded(self._environment.step(action))
+
+  def _encoded(self, timestep: dm_env.TimeStep) -> dm_env.TimeStep:
+    seen = timestep.observation
+    kept = {name: value for name, value in seen.items() if not _is_frame(name)}
+    frames = np.stack(
+      [value for name, value in seen.items() if _is_frame(name)]
+    )
+    kept[_FEATURES] = self._encode(frames[None])[0]
+    return timestep._replace(observation=kept)
+
+
+def _is_frame(name: str) -> bool:
+  return name.startswith(observations.CAMERA_PREFIX)
+
+
 def reseeded(
   environment: dm_env.Environment,
   make_environment: Callable[..., dm_env.Environment],
@@ -117,14 +192,16 @@ def reseeded(
 
 
 def widths(environment: dm_env.Environment) -> tuple[int, int]:
-  """The sizes (O, A) of flat observations and of actions."""
+  """The sizes (O, A) of flat observations without pixels, and of actions."""
   flatten, spec = flattener(environment), environment.observation_spec()
   if isinstance(spec, Mapping):
     example: Any = {name: np.zeros(part.shape) for name, part in spec.items()}
   else:
     example = np.zeros(spec.shape)
   action_size = int(np.prod(environment.action_spec().shape))
-  return len(flatten(example)), action_size
+  pixels = frame_shape(environment)
+  size = len(flatten(example)) - (math.prod(pixels) if pixels else 0)
+  return size, action_size
 
 
 def task_rewards(timestep: dm_env.TimeStep, tasks: Sequence[str]) -> np.ndarray:

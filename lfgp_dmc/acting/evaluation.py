@@ -27,6 +27,7 @@ def evaluate(
   workers: int = 1,
   progress: bool = True,
   env_step: int = 0,
+  draws: bool = False,
 ) -> list[EvaluationRow]:
   """Plays `episodes` whole episodes of each task in one environment.
 
@@ -40,6 +41,7 @@ def evaluate(
     workers: processes; 1 plays in this one.
     progress: whether to show a bar.
     env_step: goes into the rows, which come task by task.
+    draws: whether the environment makes pictures.
 
   Raises:
     LostWorkerError: see `workers.ordered`.
@@ -49,7 +51,7 @@ def evaluate(
   make_player = functools.partial(
     _Player, make_environment, make_actor, seed, env_step
   )
-  results = work.ordered(make_player, jobs, workers)
+  results = work.ordered(make_player, jobs, workers, draws)
   bar = progress_bars.bar(
     results,
     total=len(jobs),

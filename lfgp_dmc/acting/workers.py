@@ -13,7 +13,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator
 from multiprocessing import resource_tracker
 from typing import Any
 
-from lfgp_dmc import signals, threads
+from lfgp_dmc import graphics, signals, threads
 
 MakeState = Callable[[], Callable[[Any], Any]]
 
@@ -23,7 +23,10 @@ class LostWorkerError(RuntimeError):
 
 
 def ordered(
-  make_state: MakeState, jobs: Iterable[Any], workers: int
+  make_state: MakeState,
+  jobs: Iterable[Any],
+  workers: int,
+  draws: bool = False,
 ) -> Generator[Any, None, None]:
   """Yields `make_state()(job)` for each job, in order.
 
@@ -35,6 +38,7 @@ def ordered(
       ends the processes.
     workers: processes; 1 works in this one. They get no signals: what is sent
       to all of a job is this process's to handle.
+    draws: whether they make pictures.
 
   Raises:
     LostWorkerError: a process was killed. What a job raises is raised as it is.
@@ -47,12 +51,14 @@ def ordered(
       if hasattr(state, "close"):
         state.close()
     return
+  if draws:
+    graphics.allow_pictures()
   jobs = iter(jobs)
   crew: list[_Worker] = []
   waiting = concurrent.futures.ThreadPoolExecutor(workers)  # each for one
   try:
     resource_tracker.ensure_running()  # its start lets signals through again
-    with signals.held(), _variables():
+    with signals.held(), _variables(draws):
       for _ in range(workers):
         crew.append(_Worker(make_state))
     idle = collections.deque(crew)
@@ -138,13 +144,15 @@ def _end_with_parent() -> None:
 
 
 @contextlib.contextmanager
-def _variables() -> Iterator[None]:
+def _variables(draws: bool) -> Iterator[None]:
   """Sets the variables that spawned processes inherit, then restores ours.
 
   Later would be too late: what the processes unpickle first imports.
   """
   before = dict(os.environ)
-  os.environ.update(threads.ONE, MUJOCO_GL="off")
+  os.environ.update(threads.ONE)
+  if not draws:
+    os.environ["MUJOCO_GL"] = "off"
   try:
     yield
   finally:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSIONS = (1, 2)  # without and with frames
+FRAMES = "frames"
 COLLECTIONS = ("reset", "play")
 
 # Dataset name -> dtype. The shapes follow from N and the two widths.
@@ -22,8 +23,12 @@ def of_arrays(
   arrays: Mapping[str, np.ndarray],
   observation_size: int | None,
   action_size: int | None,
+  frame_shape: tuple[int, ...] | None = None,
 ) -> list[str]:
-  """Faults of the five arrays; a size of None accepts any O or A."""
+  """Faults of the five arrays, and of frames; None accepts any O, A, frames.
+
+  An empty `frame_shape` accepts none, another one only frames [C, H, W, 3].
+  """
   faults = [f"missing dataset {k!r}" for k in DTYPES if k not in arrays]
   faults += [
     f"{name!r} is {arrays[name].dtype}; valid: {dtype}"
@@ -31,7 +36,14 @@ def of_arrays(
     if name in arrays and arrays[name].dtype != dtype
   ]
   faults = faults or _wrong_shapes(arrays, observation_size, action_size)
-  return faults or _wrong_values(arrays) + _wrong_episodes(arrays)
+  if frame_shape and FRAMES not in arrays:
+    return [*faults, f"has no frames; valid: {list(frame_shape)}"]
+  if frame_shape == () and FRAMES in arrays:
+    return [*faults, "has frames; valid: none (config.camera_size is 0)"]
+  faults = faults or _wrong_values(arrays) + _wrong_episodes(arrays)
+  if FRAMES in arrays and not faults:
+    return _wrong_frames(arrays[FRAMES], arrays["episode"], frame_shape)
+  return faults
 
 
 def of_attributes(attributes: Mapping[str, Any], task: str | None) -> list[str]:
@@ -65,7 +77,10 @@ def _is_number(value: Any, kind: type = np.number) -> bool:
 
 # Attribute -> its check, and what is valid.
 _VALID = {
-  "schema_version": (lambda v: v == SCHEMA_VERSION, SCHEMA_VERSION),
+  "schema_version": (
+    lambda v: v in SCHEMA_VERSIONS,
+    " or ".join(map(str, SCHEMA_VERSIONS)),
+  ),
   "task": (_is_name, "a name"),
   "main_task": (_is_name, "a name"),
   "collection": (lambda v: v in COLLECTIONS, ", ".join(COLLECTIONS)),
@@ -128,3 +143,19 @@ def _wrong_episodes(arrays: Mapping[str, np.ndarray]) -> list[str]:
       f"{int(np.argmax(inside))}; valid: on an episode's final row only"
     )
   return faults
+
+
+def _wrong_frames(frames, episode, shape: tuple[int, ...] | None) -> list[str]:
+  """Frames are one a row, and one more after each episode's last."""
+  rows = len(episode) + len(np.unique(episode))
+  found = frames.shape
+  wanted = shape or found[1:]
+  if frames.dtype != np.uint8:
+    return [f"{FRAMES!r} is {frames.dtype}; valid: uint8"]
+  if len(wanted) != 4 or wanted[3] != 3 or found != (rows, *wanted):
+    valid = [rows, *(shape or ("C", "H", "W", 3))]
+    return [
+      f"{FRAMES!r} has shape {list(found)}; valid: {valid}, one a pair and one "
+      "more an episode"
+    ]
+  return []

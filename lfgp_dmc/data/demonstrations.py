@@ -6,21 +6,24 @@ row belongs to, never decreasing), `is_last` bool [N] (the row of success; an
 attempt cut by the exact count has none), and the attributes `schema_version`,
 `task`, `main_task`, `collection`, `expert`, `seed`, `control_hz`. Your own
 attempts become such a file by `write("stack.hdf5", from_attempts(...), {...})`.
+
+With pixels (version 2), an observation is what a robot senses, and `frames`
+uint8 [N + E, C, H, W, 3] holds those of each row, and after an episode's last
+row those that it led to: each is stored once. Reading checks and unpacks them
+into an unnamed file, where any row is at hand without being in memory.
 """
 
 import dataclasses
-import io
 import os
 import pathlib
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import h5py
 import numpy as np
 
 from lfgp_dmc.data import demonstration_checks as checks
-from lfgp_dmc.data import files
+from lfgp_dmc.data import files, frame_files
 
 SUFFIX = ".hdf5"
 
@@ -39,6 +42,7 @@ class Demonstrations:
   episode: np.ndarray  # int32 [N]
   is_last: np.ndarray  # bool [N]
   attributes: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+  frames: np.ndarray | None = None  # uint8 [N + E, C, H, W, 3]
 
   def __len__(self) -> int:
     """The number of pairs N."""
@@ -50,7 +54,7 @@ class Demonstrations:
 
   def head(self, count: int) -> "Demonstrations":
     """The first `count` pairs."""
-    return self._rows(slice(count))
+    return self._kept(np.arange(len(self)) < count)
 
   @property
   def attempts(self) -> int:
@@ -59,17 +63,29 @@ class Demonstrations:
 
   def head_attempts(self, count: int) -> "Demonstrations":
     """The pairs of the first `count` whole attempts."""
-    return self._rows(np.isin(self.episode, self.episode[self.is_last][:count]))
+    return self._kept(np.isin(self.episode, self.episode[self.is_last][:count]))
 
-  def _rows(self, kept: slice | np.ndarray) -> "Demonstrations":
-    cut: dict[str, Any] = {k: v[kept] for k, v in self.arrays().items()}
-    return dataclasses.replace(self, **cut)
+  def frame_rows(self) -> np.ndarray:
+    """Where in `frames` each row's are, int64 [N]; the next row's follow."""
+    begins = np.diff(self.episode, prepend=self.episode[:1]) > 0
+    return np.arange(len(self)) + np.cumsum(begins)
+
+  def _kept(self, chosen: np.ndarray) -> "Demonstrations":
+    """The pairs of a mask [N], which leaves no gap in an attempt."""
+    cut: dict[str, Any] = {k: v[chosen] for k, v in self.arrays().items()}
+    frames = self.frames
+    if frames is not None:
+      rows = self.frame_rows()[chosen]
+      places = np.union1d(rows, rows + 1)
+      is_head = places[-1] + 1 == len(places)  # which need not be copied
+      frames = frames[: len(places)] if is_head else frames[places]
+    return dataclasses.replace(self, **cut, frames=frames)
 
 
 def joined(parts: Sequence[Demonstrations]) -> Demonstrations:
   """One after the other; every attempt keeps a number of its own.
 
-  Attributes are the first's.
+  Attributes are the first's; frames are left out.
   """
   counts = [part.episode.max(initial=-1) + 1 for part in parts]
   first = np.cumsum([0, *counts[:-1]], dtype=np.int32)
@@ -161,10 +177,12 @@ def write(
   """
   path = pathlib.Path(path)
   attributes = {
-    "schema_version": checks.SCHEMA_VERSION,
+    "schema_version": checks.SCHEMA_VERSIONS[demonstrations.frames is not None],
     **(demonstrations.attributes if attributes is None else attributes),
   }
   arrays = demonstrations.arrays()
+  if demonstrations.frames is not None:
+    arrays[checks.FRAMES] = demonstrations.frames
   faults = checks.of_attributes(attributes, None)
   faults += checks.of_arrays(arrays, None, None)
   if faults:
@@ -172,13 +190,8 @@ def write(
   if path.exists():
     raise FileExistsError(f"{path} exists; nothing was written")
   path.parent.mkdir(parents=True, exist_ok=True)
-  content = io.BytesIO()  # HDF5 has no OSError for a full disk
-  with h5py.File(content, "w") as file:
-    for name, array in arrays.items():
-      file.create_dataset(name, data=array)
-    for name, value in attributes.items():
-      file.attrs[name] = value
-  files.write_bytes(path, content.getvalue())
+  content = frame_files.packed(arrays, attributes, checks.FRAMES)
+  files.write_bytes(path, content)
 
 
 def read(
@@ -186,8 +199,9 @@ def read(
   task: str | None = None,
   observation_size: int | None = None,
   action_size: int | None = None,
+  frame_shape: tuple[int, ...] | None = None,
 ) -> Demonstrations:
-  """Reads and checks one file, whose task, O and A may be any if None.
+  """Reads and checks one file; its task, O, A and [C, H, W, 3] if not None.
 
   Raises:
     DatasetError: it is missing, damaged or breaks the contract; the message
@@ -197,7 +211,9 @@ def read(
   if not path.is_file():
     raise DatasetError(f"{path}: missing")
   try:
-    arrays, attributes = _read_all(path)
+    arrays, attributes = frame_files.read_all(
+      path, checks.DTYPES, checks.FRAMES
+    )
   except (
     OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
     OverflowError, AttributeError,
@@ -205,11 +221,11 @@ def read(
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)
-  faults += checks.of_arrays(arrays, observation_size, action_size)
+  sizes = observation_size, action_size, frame_shape
+  faults += checks.of_arrays(arrays, *sizes)
   if faults:
     raise DatasetError(f"{path}: {'; '.join(faults)}")
-  known = {name: arrays[name] for name in checks.DTYPES}
-  return Demonstrations(**known, attributes=attributes)
+  return Demonstrations(**arrays, attributes=attributes)
 
 
 def read_folder(
@@ -217,6 +233,7 @@ def read_folder(
   tasks: Sequence[str],
   observation_size: int | None = None,
   action_size: int | None = None,
+  frame_shape: tuple[int, ...] | None = None,
 ) -> dict[str, Demonstrations]:
   """Reads the files of several tasks, in their order; see `read`.
 
@@ -236,7 +253,8 @@ def read_folder(
       missing.append(f"{path}: missing")
       continue
     try:
-      found[task] = read(path, task, observation_size, action_size)
+      sizes = observation_size, action_size, frame_shape
+      found[task] = read(path, task, *sizes)
     except DatasetError as error:
       damaged.append(str(error))
   if damaged or missing:
@@ -244,21 +262,3 @@ def read_folder(
       "\n".join([f"the dataset {folder} cannot be used:", *damaged, *missing])
     )
   return found
-
-
-def _read_all(path: pathlib.Path) -> tuple[dict[str, np.ndarray], dict]:
-  """Every top-level dataset and every attribute, as NumPy and Python values."""
-  arrays = {}
-  with h5py.File(path, "r") as file:
-    for name in checks.DTYPES:
-      if name in file and isinstance(file[name], h5py.Dataset):
-        size = file[name].nbytes
-        # Compression packs a thousandfold at most.
-        if size > 1000 * path.stat().st_size + (1 << 20):
-          raise ValueError(f"{name!r} declares {size:,} bytes")
-        arrays[name] = np.asarray(file[name][()])
-    attributes = {
-      name: value.item() if isinstance(value, np.generic) else value
-      for name, value in file.attrs.items()
-    }
-  return arrays, attributes

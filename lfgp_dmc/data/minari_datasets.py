@@ -32,11 +32,14 @@ def to_minari(found: Mapping[str, Demonstrations]) -> None:
   The keys are Minari's names, such as "lfgp_dmc/stack_reset/reach-v0".
 
   Raises:
-    ValueError: a name is taken or no name of Minari, or an episode's rows do
-      not follow from one another; the message names the dataset.
+    ValueError: a name is taken or no name of Minari, an episode's rows do not
+      follow from one another, or there are frames; the message names the
+      dataset.
   """
   for dataset_id, data in found.items():
     _check(data, dataset_id)
+    if data.frames is not None:
+      raise ValueError(f"{dataset_id}: valid: demonstrations without frames")
   made: list[pathlib.Path] = []
   try:
     for dataset_id, data in found.items():

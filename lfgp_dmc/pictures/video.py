@@ -110,6 +110,21 @@ def label(
   return np.asarray(image)
 
 
+def inset(frame: np.ndarray, views: Sequence[np.ndarray]) -> np.ndarray:
+  """Sets views uint8 [h, w, 3] into the lower left corner of a copy.
+
+  Side by side, each a quarter of the frame's height, pixels as they are.
+  """
+  frame = frame.copy()
+  side = frame.shape[0] // 4
+  for i, view in enumerate(views):
+    square = Image.fromarray(view).resize(
+      (side, side), Image.Resampling.NEAREST
+    )
+    frame[-side:, i * side : (i + 1) * side] = np.asarray(square)
+  return frame
+
+
 def _check_whole(aside: pathlib.Path, final: pathlib.Path) -> None:
   """Raises OSError if a clip ends early: FFmpeg hides a full disk."""
   try:

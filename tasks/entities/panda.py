@@ -6,6 +6,7 @@ import rtbdata
 
 from lfgp_dmc.tasks.entities import panda_links as links
 from lfgp_dmc.tasks.entities.body import Body
+from lfgp_dmc.tasks.rotations import look_at
 
 _MESHES = pathlib.Path(rtbdata.__file__).parent / "meshes/FRANKA-EMIKA/Panda"
 _WHITE = {"rgba": (0.93, 0.93, 0.94, 1.0), "specular": 0.4, "shininess": 0.5}
@@ -28,6 +29,12 @@ _BODY_POS = (0.0, 0.0145, 0.0175)  # m
 _HAND_HALF = (0.03, 0.1, 0.033)  # m
 _HAND_POS = (0.0, 0.0, 0.033)  # m
 
+# The camera in front of the hand, in the hand's frame: it looks past the
+# fingers at where they will be.
+_EYE = (0.08, 0.0, 0.04)  # m
+_TARGET = (0.02, 0.0, 0.14)  # m
+_FIELD_OF_VIEW = 75  # degrees, vertical
+
 
 class Panda(Body):
   """The arm and hand, without the servos of `tasks/control.py`.
@@ -37,6 +44,7 @@ class Panda(Body):
     finger_joints: the slides of the left (+y of the hand) and right finger.
     tcp, wrist: sites between the pads, and of the force-torque sensor.
     sensors: sensor elements by quantity; positions in the world frame.
+    camera: on the hand, the camera element.
     hanging_bodies: what hangs beyond the wrist sensor: hand and fingers.
     collision_geoms: every primitive: arm capsules, palm, fingers.
   """
@@ -117,6 +125,13 @@ class Panda(Body):
       diaginertia=links.HAND_INERTIA,
     )
     self._add_mesh(hand, "hand", self._white)
+    self.camera = hand.add(
+      "camera",
+      name="wrist",
+      pos=_EYE,
+      xyaxes=look_at(_EYE, _TARGET, up=(1.0, 0.0, 0.0)),
+      fovy=_FIELD_OF_VIEW,
+    )
     self.hand_geom = self._add_shape(
       hand, name="hand", type="box", pos=_HAND_POS, size=_HAND_HALF
     )

@@ -66,7 +66,7 @@ class Tray(Body):
       math.sin(half_turn) * math.cos(half_tilt),
     )
     size = (run / 2, ws.TRAY_HALF, _WALL_HALF)
-    return self._add_box(f"wall_{index}", pos, size, quat=quat, group=3)
+    return self._add_box(f"wall_{index}", pos, size, quat=quat, group=4)
 
   def _add_visual_wall(self, index: int) -> None:
     """A mitred prism for the eye, where the collision boxes overlap."""

@@ -70,8 +70,11 @@ class ConfigTest(parameterized.TestCase):
   def test_presets_name_fields_that_exist_and_their_kinds(self):
     for preset, changes in configs.PRESETS.items():
       kinds = {k: v for k, v in changes.items() if k.endswith(configs.KIND)}
-      values = configs.make_config("lfgp", kinds=kinds).to_dict()
-      self.assertLessEqual(set(changes), set(dict(configs.flattened(values))))
+      names: set[str] = set()
+      for algorithm, of_kind in (("lfgp", kinds), ("bc", {})):
+        values = configs.make_config(algorithm, kinds=of_kind).to_dict()
+        names |= set(dict(configs.flattened(values)))
+      self.assertLessEqual(set(changes), names)
       groups = {name.split(".")[1] for name in changes if "." in name}
       for group in groups & {"reward", "scheduler"}:
         self.assertIn(f"agent.{group}.kind", changes, preset)

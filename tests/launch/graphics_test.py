@@ -139,6 +139,24 @@ class FirstImportTest(parameterized.TestCase):
     with self.assertRaisesRegex(ValueError, "MUJOCO_GL is 'off'"):
       lfgp_dmc.load("reach", observations="vision")
 
+  def test_frames_are_drawn_after_a_command_chose_no_pictures(self):
+    if not graphics.works_without_display():
+      self.skipTest("neither EGL nor OSMesa works")
+    code = (
+      "from lfgp_dmc import graphics\n"
+      "assert graphics.choose_backend(render=False) == 'off'\n"
+      "import lfgp_dmc\n"
+      "lfgp_dmc.load('reach', 0).reset()\n"
+      "env = lfgp_dmc.load('reach', 0, observations='vision')\n"
+      "assert env.reset().observation['camera/wrist'].std() > 0\n"
+    )
+    names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
+    clean = {k: v for k, v in os.environ.items() if k not in names}
+    done = subprocess.run(
+      [sys.executable, "-c", code], env=clean, capture_output=True, text=True
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+
 
 class SetUpGraphicsTest(absltest.TestCase):
   @mock.patch.object(graphics, "works_without_display", lambda: False)

@@ -122,6 +122,6 @@ class GymnasiumTest(parameterized.TestCase):
     env = gymnasium.make(_IDS["bring"], observations="vision")
     observation, _ = env.reset(seed=0)
     self.assertTrue(env.observation_space.contains(observation))
-    self.assertEqual(observation["camera/front"].shape, (84, 84, 3))
+    self.assertEqual(observation["camera/front"].shape, (64, 64, 3))
     self.assertFalse([k for k in observation if k.startswith("success/")])
     env.close()

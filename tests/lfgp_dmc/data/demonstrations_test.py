@@ -34,7 +34,7 @@ _BAD_ATTRIBUTES = {
   "collection": ("dream", "collection is 'dream'; valid: reset, play"),
   "seed": (-1, "seed is -1"),
   "control_hz": (0.0, "control_hz is 0.0"),
-  "schema_version": (9, "schema_version is 9; valid: 1"),
+  "schema_version": (9, "schema_version is 9; valid: 1 or 2"),
 }
 
 
