@@ -1,34 +1,87 @@
 """Sizes that no machine has room for, refused before anything is made."""
 
+import contextlib
 import os
 import shutil
+from collections.abc import Iterator
 
+from lfgp_dmc import task_names
 from lfgp_dmc.data import files
 from lfgp_dmc.launch import configs
 from lfgp_dmc.launch.command import UserError
+
+# The last parts of fields that make memory.
+_MAKE_MEMORY = (
+  "hidden_size",
+  "batch_size",
+  "shifted_copies",
+  "value_penalty_window",
+  "camera_size",
+  "channels",
+  "features",
+)
 
 
 def check(config: configs.RunConfig, folder: files.Path) -> None:
   """Raises UserError where even a lower bound of the need is too large.
 
-  Each parameter has a gradient and two moments, each row of a batch a layer's
+  Each parameter has a gradient and two moments, each row of a batch two layers'
   outputs, each transition three numbers at least, on the disk of `folder`.
   """
-  memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
   disk = shutil.disk_usage(files.existing_parent(folder)).total
   width, rows = config.agent.networks.hidden_size, config.replay_capacity
+  of_algorithm = configs.ALGORITHMS[config.algorithm]
+  tasks = 1
+  if of_algorithm.is_multitask and not config.environment:
+    tasks = len(task_names.task_set(config.main_task))
+  # A task's intention; if it acts, its critics and their targets too.
+  squares = tasks * (4 if of_algorithm.is_supervised else 14)
   needs = [
-    ("agent.networks.hidden_size", width, 4 * width**2, memory),
+    ("agent.networks.hidden_size", width, squares * width**2, None),
     ("replay_capacity", rows, 3 * rows, disk),
   ]
   needs += [
-    (name, value, value * width, memory)
+    (name, value, 2 * tasks * value * width, None)
     for name, value in configs.flattened(config.to_dict())
     if name.endswith("batch_size")
   ]
-  for name, value, floats, room in needs:
-    if 4 * floats > room:
-      raise UserError(
-        f"config.{name} is {value}: it needs at least {4e-9 * floats:,.0f} GB; "
-        f"there are {1e-9 * room:,.0f} GB"
-      )
+  for need in needs:
+    refuse(*need)
+
+
+def refuse(name: str, value: int, floats: int, room: int | None = None) -> None:
+  """Raises UserError if so many floats are more bytes than room, or memory."""
+  if room is None:
+    room = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+  if 4 * floats > room:
+    raise UserError(
+      f"config.{name} is {value}: it needs at least {4e-9 * floats:,.0f} GB; "
+      f"there are {1e-9 * room:,.0f} GB"
+    )
+
+
+def is_memory_fault(error: BaseException) -> bool:
+  """Whether NumPy or torch, on any device, got no memory."""
+  return isinstance(error, MemoryError) or (
+    isinstance(error, RuntimeError) and "allocate" in str(error)
+  )
+
+
+@contextlib.contextmanager
+def told(config: configs.RunConfig) -> Iterator[None]:
+  """Turns want of memory into a UserError that names what makes it."""
+  try:
+    yield
+  except (MemoryError, RuntimeError) as error:
+    if not is_memory_fault(error):
+      raise
+    reason = str(error).partition("\n")[0]
+    makers = ", ".join(
+      f"config.{name} ({value})"
+      for name, value in configs.flattened(config.to_dict())
+      if name.endswith(_MAKE_MEMORY) and value
+    )
+    raise UserError(
+      f"out of memory: {reason or type(error).__name__}; smaller values of "
+      f"these need less: {makers}"
+    ) from error
