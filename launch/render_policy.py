@@ -192,7 +192,7 @@ def _output(
 ) -> pathlib.Path:
   """The path of the picture: a new file of a known format."""
   default = f"runs/videos/{stem}{formats[0]}".replace(" ", "_")
-  output = pathlib.Path(_OUTPUT.value or default)
+  output = pathlib.Path(_OUTPUT.value or files.unused(pathlib.Path(default)))
   if output.suffix not in formats:
     raise UserError(
       f"--output={output}: unknown format; valid: {', '.join(formats)}"

@@ -10,16 +10,7 @@ from lfgp_dmc.data import files
 from lfgp_dmc.launch import configs
 from lfgp_dmc.launch.command import UserError
 
-# The last parts of fields that make memory.
-_MAKE_MEMORY = (
-  "hidden_size",
-  "batch_size",
-  "shifted_copies",
-  "value_penalty_window",
-  "camera_size",
-  "channels",
-  "features",
-)
+_MAKE_MEMORY = ("_size", "_copies", "_window")  # how such fields end
 
 
 def check(config: configs.RunConfig, folder: files.Path) -> None:
@@ -36,17 +27,11 @@ def check(config: configs.RunConfig, folder: files.Path) -> None:
     tasks = len(task_names.task_set(config.main_task))
   # A task's intention; if it acts, its critics and their targets too.
   squares = tasks * (4 if of_algorithm.is_supervised else 14)
-  needs = [
-    ("agent.networks.hidden_size", width, squares * width**2, None),
-    ("replay_capacity", rows, 3 * rows, disk),
-  ]
-  needs += [
-    (name, value, 2 * tasks * value * width, None)
-    for name, value in configs.flattened(config.to_dict())
-    if name.endswith("batch_size")
-  ]
-  for need in needs:
-    refuse(*need)
+  refuse("agent.networks.hidden_size", width, squares * width**2)
+  refuse("replay_capacity", rows, 3 * rows, disk)
+  for name, value in configs.flattened(config.to_dict()):
+    if name.endswith("batch_size"):
+      refuse(name, value, 2 * tasks * value * width)
 
 
 def refuse(name: str, value: int, floats: int, room: int | None = None) -> None:
@@ -61,10 +46,8 @@ def refuse(name: str, value: int, floats: int, room: int | None = None) -> None:
 
 
 def is_memory_fault(error: BaseException) -> bool:
-  """Whether NumPy or torch, on any device, got no memory."""
-  return isinstance(error, MemoryError) or (
-    isinstance(error, RuntimeError) and "allocate" in str(error)
-  )
+  """Whether NumPy, torch (on any device) or the system had no memory."""
+  return isinstance(error, MemoryError) or "allocate" in str(error)
 
 
 @contextlib.contextmanager
@@ -72,16 +55,16 @@ def told(config: configs.RunConfig) -> Iterator[None]:
   """Turns want of memory into a UserError that names what makes it."""
   try:
     yield
-  except (MemoryError, RuntimeError) as error:
+  except Exception as error:
     if not is_memory_fault(error):
       raise
-    reason = str(error).partition("\n")[0]
-    makers = ", ".join(
+    reason = str(error).partition("\n")[0] or "NumPy got none"
+    makers = [
       f"config.{name} ({value})"
       for name, value in configs.flattened(config.to_dict())
       if name.endswith(_MAKE_MEMORY) and value
-    )
+    ]
     raise UserError(
-      f"out of memory: {reason or type(error).__name__}; smaller values of "
-      f"these need less: {makers}"
+      f"out of memory: {reason}; smaller values of these need less: "
+      + ", ".join(makers)
     ) from error

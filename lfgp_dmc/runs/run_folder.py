@@ -57,11 +57,7 @@ def default_path(
   """`runs/20220131_235959_lfgp_stack`, or with `_2`, ... if that exists."""
   now = datetime.datetime.now() if now is None else now
   stem = f"{now:%Y%m%d_%H%M%S}_{algorithm}_{task}"
-  path, number = pathlib.Path(parent) / stem, 1
-  while path.exists():
-    number += 1
-    path = pathlib.Path(parent) / f"{stem}_{number}"
-  return path
+  return files.unused(pathlib.Path(parent) / stem)
 
 
 def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:

@@ -67,15 +67,13 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
 
 
 def read_config(path: pathlib.Path) -> dict[str, Any]:
-  """A run's config; raises ValueError if it is none or says not what of."""
+  """A run's config; raises ValueError if it does not say of which run."""
   config = run_folder.read_config(path)
-  names = ("algorithm", "main_task")
-  missing = [name for name in names if not isinstance(config.get(name), str)]
-  if missing:
-    raise ValueError(
-      f"{path / run_folder.CONFIG_NAME} is of no run: it has no "
-      + " and no ".join(missing)
-    )
+  for name in ("algorithm", "main_task"):
+    if not isinstance(config.get(name), str):
+      raise ValueError(
+        f"{path / run_folder.CONFIG_NAME} is of no run: it has no {name}"
+      )
   return config
 
 

@@ -119,7 +119,7 @@ class StudyTest(FolderTest):
       lambda: run_picture.draw(self.folder, self.folder / "a.png"),
     ):
       with self.assertRaisesRegex(
-        ValueError, "config.json is of no run: it has no algorithm and no main_"
+        ValueError, "config.json is of no run: it has no algorithm"
       ):
         read()
 
