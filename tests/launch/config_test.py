@@ -163,9 +163,7 @@ class ConfigTest(parameterized.TestCase):
         resolve(symmetry, "--config.environment=package.module:factory")
 
   def test_pairs_and_attempts_are_not_both_counted(self):
-    with self.assertRaisesRegex(
-      ValueError, "collect_missing is True"
-    ):
+    with self.assertRaisesRegex(ValueError, "collect_missing is True"):
       resolve("--config.collect_missing")
     with self.assertRaisesRegex(ValueError, "attempts_per_task is 5; valid: 0"):
       resolve("--config.attempts_per_task=5", "--config.pairs_per_task=9")
