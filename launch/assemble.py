@@ -10,7 +10,7 @@ import dm_env
 import numpy as np
 import torch
 
-from lfgp_dmc import seeding, task_names
+from lfgp_dmc import progress_bars, seeding, task_names
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
@@ -29,6 +29,7 @@ from lfgp_dmc.runs.schedule import TrainSchedule
 from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 _DETERMINISTIC_CUBLAS = ":4096:8"
+_FRAMES = 256  # that are encoded at a time
 
 
 class Parts(NamedTuple):
@@ -63,7 +64,7 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
     return Parts(environment, tasks, widths, found, device, shape)
   clone = _clone_of(config, folder)
   environment = environments.with_features(environment, clone.encode)
-  found = {task: _with_features(data, clone) for task, data in found.items()}
+  found = {k: _with_features(k, data, clone) for k, data in found.items()}
   widths = environments.widths(environment)
   encoder = encoders.frozen(clone)
   return Parts(environment, tasks, widths, found, device, shape, encoder)
@@ -87,10 +88,20 @@ def _clone_of(config: RunConfig, folder: pathlib.Path | None) -> Policy:
   return policy
 
 
-def _with_features(data: Demonstrations, clone: Policy) -> Demonstrations:
+def _with_features(
+  task: str, data: Demonstrations, clone: Policy
+) -> Demonstrations:
   """Demonstrations with features in the place of frames."""
-  assert data.frames is not None, "they were checked"
-  features, rows = clone.encode(data.frames), data.frame_rows()
+  frames = data.frames
+  assert frames is not None, "they were checked"
+  parts = []
+  with progress_bars.bar(
+    total=len(frames), desc=f"encoding {task}", unit="frame"
+  ) as bar:
+    for start in range(0, len(frames), _FRAMES):
+      parts.append(clone.encode(frames[start : start + _FRAMES]))
+      bar.update(len(parts[-1]))
+  features, rows = np.concatenate(parts), data.frame_rows()
   return dataclasses.replace(
     data,
     observation=np.hstack([data.observation, features[rows]]),

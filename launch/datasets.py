@@ -100,8 +100,8 @@ def _check_rate(config: RunConfig, found: dict[str, Demonstrations]) -> None:
 
 
 def _collect(config: RunConfig) -> None:
-  """Collects the dataset if `config.collect_pairs` says so."""
-  if not config.collect_pairs:
+  """Collects the dataset if `config.collect_missing` says so."""
+  if not config.collect_missing:
     return
   print(f"collecting demonstrations: {_command(config)}", flush=True)
   arguments = [sys.executable, str(_COLLECT), *_flags(config)]
@@ -123,10 +123,11 @@ def _command(config: RunConfig) -> str:
 
 
 def _flags(config: RunConfig) -> list[str]:
+  unit = "attempts_per_task" if config.attempts_per_task else "pairs_per_task"
   flags = {
     "task": config.main_task,
     "tasks": config.main_task,
-    "pairs_per_task": config.collect_pairs or "...",
+    unit: getattr(config, unit) or "...",
     "seed": config.seed,
     "control_hz": config.control_hz,
     "camera_size": config.camera_size,

@@ -41,7 +41,7 @@ class RunConfig:
   attempts_per_task: Count = 0  # likewise whole attempts, instead; 0: all
   mirror_demonstrations: Switch = False  # and as many mirror images of them
   shifted_copies: Count = 0  # of all these, elsewhere in the plane
-  collect_pairs: Count = 0  # collect so many a task if there is no folder
+  collect_missing: Switch = False  # if there is no folder, as many as are used
   demonstrations_sha256: Text = ""  # of what was read; filled in by the run
 
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
@@ -114,6 +114,13 @@ class RunConfig:
       yield (
         f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
         f"pairs_per_task={self.pairs_per_task}"
+      )
+    if self.collect_missing and not (
+      self.attempts_per_task or self.pairs_per_task
+    ):
+      yield (
+        "collect_missing is True; valid: False without pairs_per_task or "
+        "attempts_per_task"
       )
     if self.camera_size and self.mirror_demonstrations:
       yield (

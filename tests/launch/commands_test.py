@@ -23,7 +23,8 @@ class DemoTest(FolderTest):
     done = fixtures.call(
       f"demo.py --flagfile={flagfile} --run=runs/demo --height=64 --width=64 "
       f"--stored={stored} --config.main_task=open_gripper "
-      "--config.collect_pairs=40 --config.env_steps=360 "
+      "--config.attempts_per_task=3 --config.env_steps=360 "
+      "--config.warm_up=200 --config.agent.scheduler.kind=weighted_random "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
       "--config.agent.pretraining.updates=5",

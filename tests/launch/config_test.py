@@ -163,6 +163,8 @@ class ConfigTest(parameterized.TestCase):
         resolve(symmetry, "--config.environment=package.module:factory")
 
   def test_pairs_and_attempts_are_not_both_counted(self):
+    with self.assertRaisesRegex(ValueError, "collect_missing is True"):
+      resolve("--config.collect_missing")
     with self.assertRaisesRegex(ValueError, "attempts_per_task is 5; valid: 0"):
       resolve("--config.attempts_per_task=5", "--config.pairs_per_task=9")
 
@@ -202,7 +204,7 @@ class FlagfilesTest(parameterized.TestCase):
       self.assertEqual(
         config.agent.uses_demonstrations, bool(config.demonstrations)
       )
-      if name != "quickstart.flags" and config.demonstrations:
+      if config.demonstrations:
         self.assertStartsWith(config.demonstrations, f"data/{task}_")
 
   def test_there_is_one_for_each_algorithm_and_few_others(self):

@@ -48,8 +48,8 @@ class DatasetsTest(fixtures.RunTest):
   def test_collects_into_a_folder_with_blanks(self):
     folder = self.folder / "it's mine; really"
     config = self.config(
-      demonstrations=str(folder), collect_pairs=30, environment="",
-      main_task="lift",
+      demonstrations=str(folder), collect_missing=True, pairs_per_task=30,
+      environment="", main_task="lift",
     )  # fmt: skip
     with (
       mock.patch.object(subprocess, "Popen") as popen,
