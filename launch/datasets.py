@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from lfgp_dmc import seeding
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.launch import sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
@@ -51,9 +52,11 @@ def load(
   found = _counted(config, found)
   if config.mirror_demonstrations:
     found = mirror.with_images(found)
-  if config.shifted_copies:
+  if copies := config.shifted_copies:
+    floats = sum(d.action.size + 2 * d.observation.size for d in found.values())
+    sizes.refuse("shifted_copies", copies, copies * floats)
     generator = seeding.generator(config.seed, "shifts")
-    found = translation.with_copies(found, config.shifted_copies, generator)
+    found = translation.with_copies(found, copies, generator)
   return found
 
 

@@ -1,8 +1,8 @@
 """Draws figures from the CSV files of runs.
 
   python launch/plot.py --run=runs/stack_1
-  python launch/plot.py --runs=runs/stack_1,runs/stack_2 --output=results
-  python launch/plot.py --figure=main --runs=runs/paper --output=results
+  python launch/plot.py --runs=runs/stack_1,runs/stack_2
+  python launch/plot.py --figure=main --runs=runs/paper --output=runs/paper
   python launch/plot.py --attempts=results/few/attempts.csv
 
 --run shows what one run has logged, also while it trains: success by task,
@@ -53,7 +53,8 @@ _BASELINE = flags.DEFINE_string(
 _OUTPUT = flags.DEFINE_string(
   "output",
   "",
-  "Folder for the figures; default: results, or where --run or --attempts lie.",
+  "Folder for the figures; default: runs/figures, or where --run or --attempts "
+  "lie.",
 )
 _FIGURE = flags.DEFINE_enum(
   "figure", _EACH, [_EACH, *figures.FIGURES], "Which figure; see above."
@@ -148,7 +149,7 @@ def _draw_study(runs: list[run_results.Run]) -> list[str]:
 
 
 def _path(*words: str) -> pathlib.Path:
-  folder = pathlib.Path(_OUTPUT.value or "results")
+  folder = pathlib.Path(_OUTPUT.value or "runs/figures")
   return folder / f"{'_'.join(words)}.{_FORMAT.value}"
 
 

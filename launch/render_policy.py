@@ -2,10 +2,10 @@
 
   python launch/render_policy.py --expert=scripted --task=stack
   python launch/render_policy.py --run=runs/stack_1 --task=scheduled \
-      --output=videos/scheduled.mp4
+      --output=runs/scheduled.mp4
   python launch/render_policy.py --run=runs/stack_1 --grid=2x3
   python launch/render_policy.py --what=strips --expert=scripted \
-      --output=videos/example_runs.png
+      --output=runs/example_runs.png
   python launch/render_policy.py --what=reset --task=insert
 
 --what=episode plays one, or --grid=2x3 six of them with consecutive seeds side
@@ -49,7 +49,7 @@ _COLLECTION = flags.DEFINE_enum(
   "collection", "reset", ["reset", "play"], "play: task after task, no reset."
 )
 _OUTPUT = flags.DEFINE_string(
-  "output", "", ".mp4, .gif, .webp or .png; default: videos/NAME_TASK.mp4."
+  "output", "", ".mp4, .gif, .webp or .png; default: runs/videos/NAME_TASK.mp4."
 )
 _GRID = flags.DEFINE_string("grid", "1x1", "Rows x columns of seeds.")
 _SEED = flags.DEFINE_integer("seed", 0, "Of the (first) reset.", lower_bound=0)
@@ -191,8 +191,8 @@ def _output(
   stem: str, formats: tuple[str, ...] = video.FORMATS
 ) -> pathlib.Path:
   """The path of the picture: a new file of a known format."""
-  default = f"videos/{stem}{formats[0]}".replace(" ", "_")
-  output = pathlib.Path(_OUTPUT.value or default)
+  default = f"runs/videos/{stem}{formats[0]}".replace(" ", "_")
+  output = pathlib.Path(_OUTPUT.value or files.unused(pathlib.Path(default)))
   if output.suffix not in formats:
     raise UserError(
       f"--output={output}: unknown format; valid: {', '.join(formats)}"

@@ -24,7 +24,7 @@ from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
 
 # What bad input raises while a run is made.
-_INPUT = (ValueError, OSError, MemoryError, OverflowError)
+_INPUT = (ValueError, OSError, OverflowError)
 
 
 def train(
@@ -44,6 +44,14 @@ def train(
     )
   sizes.check(config, path)
   files.check_writable(path / run_folder.CONFIG_NAME)
+  with sizes.told(config):
+    return _train(config, path, resume, progress_bar)
+
+
+def _train(
+  config: RunConfig, path: pathlib.Path, resume: bool, progress_bar: bool
+) -> Progress:
+  """Trains with sizes that may be too large still."""
   sha256 = config.demonstrations_sha256
   if resume:
     with command.checked_input():
@@ -66,17 +74,22 @@ def train(
   if not resume:
     with command.checked_input():
       folder = run_folder.create(path, config.to_dict())
+  is_useless = True
   try:
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
       _initialise(config, run.agent, run.replay)
+    is_useless = False
+    return run.train()
   except BaseException as error:
-    if not resume:  # it cannot start: as if it had not been tried
+    is_input = is_useless and isinstance(error, _INPUT)
+    if sizes.is_memory_fault(error):  # in the first updates, mostly
+      is_useless = checkpoints.latest(folder.checkpoints) is None
+    if is_useless and not resume:  # as if it had not been tried
       shutil.rmtree(path)
-    if isinstance(error, _INPUT) or "allocate" in str(error):  # torch
+    if is_input:
       raise UserError(str(error)) from error
     raise
-  return run.train()
 
 
 def _sha256(found: dict[str, Demonstrations]) -> str:

@@ -57,6 +57,15 @@ def check_writable(path: Path) -> None:
     raise OSError(error.errno, error.strerror, os.fspath(path)) from None
 
 
+def unused(path: pathlib.Path) -> pathlib.Path:
+  """Such as `a.mp4`, or `a_2.mp4`, ... if that exists."""
+  free, number = path, 1
+  while free.exists():
+    number += 1
+    free = path.with_name(f"{path.stem}_{number}{path.suffix}")
+  return free
+
+
 def existing_parent(path: Path) -> pathlib.Path:
   """The innermost folder above `path` that exists."""
   parents = pathlib.Path(path).absolute().parents

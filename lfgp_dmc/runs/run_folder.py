@@ -22,6 +22,7 @@ ARRAYS_NAME = "policy.safetensors"
 POLICY_FIELD = "policy"
 # When a run is resumed: neither changes a number, if the data are the same.
 _MAY_CHANGE = ("demonstrations", "demonstrations_sha256", "evaluation_workers")
+_SHOWN = 4  # differing fields in a message
 
 
 @dataclasses.dataclass(frozen=True)
@@ -56,11 +57,7 @@ def default_path(
   """`runs/20220131_235959_lfgp_stack`, or with `_2`, ... if that exists."""
   now = datetime.datetime.now() if now is None else now
   stem = f"{now:%Y%m%d_%H%M%S}_{algorithm}_{task}"
-  path, number = pathlib.Path(parent) / stem, 1
-  while path.exists():
-    number += 1
-    path = pathlib.Path(parent) / f"{stem}_{number}"
-  return path
+  return files.unused(pathlib.Path(parent) / stem)
 
 
 def create(path: files.Path, config: Mapping[str, Any]) -> RunFolder:
@@ -107,9 +104,12 @@ def resume(
   known = complete(settings(read_config(path)))
   fields = _differing_fields(known, settings(config))
   if fields:
+    shown = fields[:_SHOWN]
+    if more := len(fields) - len(shown):
+      shown.append(f"and {more} more")
     raise ValueError(
       f"{path} was started with another config; --resume keeps it. Differing: "
-      + "; ".join(fields)
+      + "; ".join(shown)
     )
   return RunFolder(path, _locked(path))
 
@@ -151,6 +151,8 @@ def _differing_fields(
     for config in (known, given)
   )
   names = [*first, *(name for name in second if name not in first)]
+  # First what decides which others there are.
+  names.sort(key=lambda name: not name.endswith(("algorithm", "kind")))
   return [
     f"{name} ({first.get(name, 'unset')}, now {second.get(name, 'unset')})"
     for name in names

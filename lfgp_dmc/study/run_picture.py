@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lfgp_dmc.data import csv_files, evaluation_csv, files
-from lfgp_dmc.runs import run_folder
 from lfgp_dmc.study import drawing, run_results
 
 NAME = "learning_curve.png"  # in the run's folder
@@ -56,7 +55,7 @@ def draw(path: files.Path, output: files.Path) -> None:
       cannot be written.
   """
   path = pathlib.Path(path)
-  config = run_folder.read_config(path)
+  config = run_results.read_config(path)
   logged = _logged(path)
   panels = [panel for panel in _PANELS if panel.name in logged]
   if not panels:
@@ -66,7 +65,7 @@ def draw(path: files.Path, output: files.Path) -> None:
   shown = [logged[panel.name] for panel in panels]
   end = max(line[-1][0] for curves in shown for line in curves.values())
   styles = drawing.styles_of(dict.fromkeys(itertools.chain(*shown)))
-  algorithm, main_task = config.get("algorithm"), config.get("main_task")
+  algorithm, main_task = config["algorithm"], config["main_task"]
   is_cloning = algorithm in run_results.WITHOUT_STEPS
   unit = "updates" if is_cloning else drawing.STEPS
   rows = 1 if len(panels) < 4 else 2

@@ -47,13 +47,13 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
   runs: dict[tuple, Run] = {}
   notes = []
   for path in _expanded(folders):
-    config = run_folder.read_config(path)
+    config = read_config(path)
     evaluation = path / "evaluation.csv"
     rows = evaluation_csv.read_csv(evaluation) if evaluation.is_file() else []
     if not rows:
       notes.append(f"{path}: nothing was evaluated yet, left out")
       continue
-    main_task, seed = str(config.get("main_task", "?")), config.get("seed", 0)
+    main_task, seed = config["main_task"], config.get("seed", 0)
     if not isinstance(seed, int):
       raise ValueError(f"{path / run_folder.CONFIG_NAME}: seed is {seed!r}")
     run = Run(method_of(config), main_task, seed, path, rows)
@@ -66,12 +66,23 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
   return sorted(runs.values(), key=lambda run: run[:3]), notes
 
 
+def read_config(path: pathlib.Path) -> dict[str, Any]:
+  """A run's config; raises ValueError if it does not say of which run."""
+  config = run_folder.read_config(path)
+  for name in ("algorithm", "main_task"):
+    if not isinstance(config.get(name), str):
+      raise ValueError(
+        f"{path / run_folder.CONFIG_NAME} is of no run: it has no {name}"
+      )
+  return config
+
+
 def method_of(config: Mapping[str, Any]) -> str:
   """The algorithm, with `_transfer` if the run starts from another one.
 
   Else with `_play` if the demonstrations' folder is named so, as `stack_play`.
   """
-  algorithm = str(config.get("algorithm", "?"))
+  algorithm = config["algorithm"]
   folder = pathlib.Path(str(config.get("demonstrations") or ""))
   if config.get("transfer_from"):
     return f"{algorithm}_transfer"

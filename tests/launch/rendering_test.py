@@ -123,6 +123,11 @@ class RenderingTest(FolderTest):
     )
     self.assertEqual(picture.shape, (64, 96, 3))
     self.assertFalse(np.array_equal(picture[:, :48], picture[:, 48:]))
+    printed = [self._render("--what=reset").stdout for _ in range(2)]
+    self.assertEqual(
+      printed,
+      ["runs/videos/reset_stack.png\n", "runs/videos/reset_stack_2.png\n"],
+    )
     for bad, message in (
       ("--grid=2", "--grid=2; valid: ROWSxCOLUMNS"),
       ("--output=a.mp4", "unknown format; valid: .png"),

@@ -104,7 +104,7 @@ class TrainingTest(fixtures.RunTest):
       ("config.agent.scheduler.xi=9", r"Differing: .*xi \(5, now 9\)"),
       ("config.agent.scheduler.kind=uniform", r"kind \(.*, now .*uniform"),
       ("config.algorithm=bc", "Differing: algorithm"),
-      ("preset=fast", "agent.prior.weight"),
+      ("preset=fast", r"([^;]*; ){4}and \d+ more"),
     ):
       done = fixtures.call(f"{line} --{flag}", self.folder)
       self.assertRegex(done.stderr, rf"\Aerror: runs/a was.*{said}.*\n\Z")
@@ -155,7 +155,32 @@ class TrainingTest(fixtures.RunTest):
     self.assertFalse((self.folder / "runs" / "a").exists())
 
   @parameterized.parameters(
-    ("lfgp_dmc.launch.assemble.make_agent", MemoryError("9 GB"), UserError),
+    ("assemble.make_parts", MemoryError("9 GB")),
+    ("assemble.make_agent", MemoryError()),
+    ("assemble.Run.train", RuntimeError("can't allocate memory\nmore")),
+  )
+  def test_too_little_memory_is_told_and_leaves_no_folder(self, place, fault):
+    with (
+      mock.patch(f"lfgp_dmc.launch.{place}", side_effect=fault),
+      self.assertRaisesRegex(
+        UserError,
+        r"^out of memory: .* config.agent.networks.hidden_size \(16\)",
+      ),
+    ):
+      self.train(self.config())
+    self.assertFalse((self.folder / "runs" / "a").exists())
+
+  def test_little_memory_later_loses_nothing(self):
+    config = self.config(env_steps=120, checkpoint_every=60)
+    fault = RuntimeError("can't allocate memory")
+    with (
+      mock.patch.object(run.Run, "_evaluate", side_effect=fault),
+      self.assertRaisesRegex(UserError, "out of memory"),
+    ):
+      self.train(config)
+    self.assertTrue((self.folder / "runs" / "a").exists())
+
+  @parameterized.parameters(
     (
       "lfgp_dmc.launch.assemble.make_agent",
       KeyboardInterrupt(),

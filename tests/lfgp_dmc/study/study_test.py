@@ -7,7 +7,7 @@ import numpy as np
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.data import csv_files, evaluation_csv
-from lfgp_dmc.study import figures, run_results, statistics
+from lfgp_dmc.study import figures, run_picture, run_results, statistics
 from lfgp_dmc.task_names import MAIN_TASKS, task_set
 from tests.fixtures import FolderTest
 
@@ -111,6 +111,17 @@ class StudyTest(FolderTest):
       self._write("lfgp", "stack", seed, {0: 0})
       with self.assertRaisesRegex(ValueError, "config.json: seed is"):
         self._read()
+
+  def test_a_config_that_says_not_of_what_is_named(self):
+    (self.folder / "config.json").write_text('{"algorithm": 1}')
+    for read in (
+      lambda: self._read(),
+      lambda: run_picture.draw(self.folder, self.folder / "a.png"),
+    ):
+      with self.assertRaisesRegex(
+        ValueError, "config.json is of no run: it has no algorithm"
+      ):
+        read()
 
   def test_a_run_without_evaluation_is_noted(self):
     self._write("lfgp", "stack", 0, {})
