@@ -45,9 +45,7 @@ class DiscriminatorPasses(torch.autograd.Function):
   ) -> tuple[torch.Tensor, torch.Tensor]:
     """Computes in the dtype of `pairs`; float32 results."""
     dtype, (rows, width) = pairs.dtype, pairs.shape
-    weight_1, bias_1, weight_2, bias_2, weight_3, bias_3 = (
-      parameter.to(dtype) for parameter in parameters
-    )
+    weight_1, bias_1, weight_2, bias_2, weight_3, bias_3 = parameters
     filling = (0, -width % _ALIGNED)
     weight_1 = functional.pad(weight_1, filling)
     inputs = functional.pad(torch.cat([pairs, mixed]), filling)
@@ -102,9 +100,9 @@ class DiscriminatorPasses(torch.autograd.Function):
       torch.addmm(before_2.t() @ first, by_second.t(), through_1),
       before_2.sum(0),
       by_logits.t() @ second[:rows] + by_output,
-      by[0].sum(0),
+      by_logits.sum(0),
     )
-    return (None, None, None, *(part.float() for part in gradients))
+    return (None, None, None, *gradients)
 
 
 def _output_weight(weight: torch.Tensor, per_task: bool) -> torch.Tensor:
