@@ -171,7 +171,6 @@ def build(
   """
   del replay, unused
   device = torch.device(device)
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   encoder, seen = None, config.encoder
   if frame_shape:

@@ -27,14 +27,12 @@ class FlatParameters:
     self.values, self.gradient = flat, torch.zeros_like(flat)
     self._sizes = [p.numel() for p in parameters]
     self._leaves: list[torch.Tensor] = list(parameters)
-    self._copy, self._by_leaves = None, self.gradient
+    self._copy = self._by_copy = None
     for parameter, value, gradient in self._parts(flat, self.gradient):
       parameter.data, parameter.grad = value, gradient
     if dtype != flat.dtype:
-      self._copy, self._by_leaves = flat.to(dtype), flat.to(dtype)
-      for parameter, value, gradient in self._parts(
-        self._copy, self._by_leaves
-      ):
+      self._copy, self._by_copy = flat.to(dtype), flat.to(dtype)
+      for parameter, value, gradient in self._parts(self._copy, self._by_copy):
         setattr(parameter, _COPY, value.requires_grad_(trained))
         value.grad = gradient
       self._leaves = [getattr(p, _COPY) for p in parameters]
@@ -46,11 +44,13 @@ class FlatParameters:
       yield parameter, *(part.view_as(parameter) for part in parts)
 
   def backward(self, loss: torch.Tensor) -> torch.Tensor:
-    """The loss's gradient, float32 [P]."""
-    self._by_leaves.zero_()
+    """The loss's gradient, float32 [P], by parameters and copies together."""
+    self.gradient.zero_()
+    if self._by_copy is not None:
+      self._by_copy.zero_()
     loss.backward()
-    if self._by_leaves is not self.gradient:
-      self.gradient.copy_(self._by_leaves)
+    if self._by_copy is not None:
+      self.gradient += self._by_copy
     return self.gradient
 
   @contextmanager

@@ -4,7 +4,7 @@ import torch
 from absl.testing import parameterized
 from torch import nn
 
-from lfgp_dmc.agents.networks.flat import FlatParameters
+from lfgp_dmc.agents.networks.flat import FlatParameters, in_products
 from lfgp_dmc.agents.optimisation import Adam
 
 
@@ -49,3 +49,10 @@ class AdamTest(parameterized.TestCase):
     expected = adam.state_dict()
     for name, value in fresh.state_dict().items():
       torch.testing.assert_close(value, expected[name])
+
+  def test_parameters_used_in_both_dtypes_learn_from_both(self):
+    parameter = nn.Parameter(torch.ones(2))
+    flat = FlatParameters([parameter], torch.bfloat16)
+    copy = in_products(parameter, torch.bfloat16)
+    gradient = flat.backward((3 * parameter[0]) + (2 * copy[1]))
+    self.assertEqual(gradient.tolist(), [3.0, 2.0])
