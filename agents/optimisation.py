@@ -38,7 +38,7 @@ class Adam:
 
   def step(self, loss: torch.Tensor) -> torch.Tensor:
     """Makes one step down the gradient; returns its norm before clipping."""
-    gradient = self._parameters.backward(loss)
+    gradient = self._parameters.differentiate(loss)
     norm = torch.linalg.vector_norm(gradient)
     too_long = None
     if self._max_norm:  # what the step divides the gradient by

@@ -44,14 +44,13 @@ class IntentionLearner:
     """One update of intentions, then of temperatures, on inputs [B, O]."""
     networks = self._networks
     inputs = inputs.to(self._dtype)
-    with networks.critics.flat.frozen():
-      critic_features = networks.critics.trunk(inputs)
-      features = critic_features
-      if networks.intentions.owns_trunk:
-        features = networks.intentions.trunk(inputs)
-      mean, std = networks.intentions.heads(features)
-      action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
-      q = networks.critics.heads(critic_features, action)
+    critic_features = networks.critics.trunk(inputs)
+    features = critic_features
+    if networks.intentions.owns_trunk:
+      features = networks.intentions.trunk(inputs)
+    mean, std = networks.intentions.heads(features)
+    action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
+    q = networks.critics.heads(critic_features, action)
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )

@@ -69,8 +69,8 @@ class TwinCriticHeads(nn.Module):
       hidden = self.second(hidden.relu_())
     if self.gain is not None and self.shift is not None:
       hidden = functional.layer_norm(hidden, hidden.shape[-1:])
-      hidden = hidden * in_products(self.gain, dtype) + in_products(
-        self.shift, dtype
+      hidden = torch.addcmul(
+        in_products(self.shift, dtype), hidden, in_products(self.gain, dtype)
       )
     value = _single_outputs(hidden.relu_(), self.output)
     return value.float().reshape(2, self.tasks, rows)

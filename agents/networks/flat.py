@@ -4,8 +4,8 @@ An update then steps, clips, casts and follows in one operation each, however
 many layers there are.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+import itertools
+from collections.abc import Sequence
 
 import torch
 from torch import nn
@@ -22,47 +22,41 @@ class FlatParameters:
     `dtype` is that of products: float32, or bfloat16, of which there is then a
     copy. Whoever writes to parameters by other means refreshes it.
     """
-    flat = torch.cat([p.detach().flatten() for p in parameters])
-    trained = parameters[0].requires_grad
-    self.values, self.gradient = flat, torch.zeros_like(flat)
-    self._sizes = [p.numel() for p in parameters]
-    self._leaves: list[torch.Tensor] = list(parameters)
-    self._copy = self._by_copy = None
-    for parameter, value, gradient in self._parts(flat, self.gradient):
+    self.values = torch.cat([p.detach().flatten() for p in parameters])
+    self.gradient = torch.zeros_like(self.values)  # [P], their `grad`
+    self._parameters = list(parameters)
+    self._copy = None
+    self._copies: list[torch.Tensor] = []
+    self._places = self._parts(self.gradient)
+    for parameter, value, gradient in zip(
+      parameters, self._parts(self.values), self._places, strict=True
+    ):
       parameter.data, parameter.grad = value, gradient
-    if dtype != flat.dtype:
-      self._copy, self._by_copy = flat.to(dtype), flat.to(dtype)
-      for parameter, value, gradient in self._parts(self._copy, self._by_copy):
-        setattr(parameter, _COPY, value.requires_grad_(trained))
-        value.grad = gradient
-      self._leaves = [getattr(p, _COPY) for p in parameters]
+    if dtype != self.values.dtype:
+      self._copy = self.values.to(dtype)
+      self._copies = self._parts(self._copy)
+      for parameter, copy in zip(parameters, self._copies, strict=True):
+        copy.requires_grad_(parameter.requires_grad)
+        setattr(parameter, _COPY, copy)
 
-  def _parts(self, *whole: torch.Tensor):
-    """Each parameter, and its parts of the tensors."""
-    split = (tensor.split(self._sizes) for tensor in whole)
-    for parameter, *parts in zip(self._leaves, *split, strict=True):
-      yield parameter, *(part.view_as(parameter) for part in parts)
+  def _parts(self, whole: torch.Tensor) -> list[torch.Tensor]:
+    """Each parameter's part of a tensor [P]."""
+    parts = whole.split([p.numel() for p in self._parameters])
+    pairs = zip(parts, self._parameters, strict=True)
+    return [part.view_as(parameter) for part, parameter in pairs]
 
-  def backward(self, loss: torch.Tensor) -> torch.Tensor:
-    """The loss's gradient, float32 [P], by parameters and copies together."""
-    self.gradient.zero_()
-    if self._by_copy is not None:
-      self._by_copy.zero_()
-    loss.backward()
-    if self._by_copy is not None:
-      self.gradient += self._by_copy
+  def differentiate(self, loss: torch.Tensor) -> torch.Tensor:
+    """The loss's gradient by these parameters alone, float32 [P].
+
+    Of each, products use the copy or float32 operations itself, never both.
+    """
+    leaves = [*self._parameters, *self._copies]
+    found = torch.autograd.grad(loss, leaves, allow_unused=True)
+    own, by_copy = found[: len(self._places)], found[len(self._places) :]
+    for place, *parts in itertools.zip_longest(self._places, own, by_copy):
+      part = next((part for part in parts if part is not None), None)
+      place.zero_() if part is None else place.copy_(part)
     return self.gradient
-
-  @contextmanager
-  def frozen(self) -> Iterator[None]:
-    """Inside, gradients flow through, but not to, these parameters."""
-    for leaf in self._leaves:
-      leaf.requires_grad_(False)
-    try:
-      yield
-    finally:
-      for leaf in self._leaves:
-        leaf.requires_grad_(True)
 
   def refresh(self) -> None:
     """Casts the values anew for products."""

@@ -59,15 +59,15 @@ class StackedLinear(nn.Module):
 
     Maps [G, B, I], or [B, I] for the same rows in every group, to [G, B, O].
     """
-    if self.weight.shape[0] == 1:  # a plain product is faster than a batched
-      rows = inputs.reshape(-1, inputs.shape[-1])
-      return self.one(rows, 0)[None]
-    if inputs.dim() == 2:
-      inputs = inputs.expand(self.weight.shape[0], *inputs.shape)
-    dtype = inputs.dtype
-    return torch.baddbmm(
-      in_products(self.bias, dtype), inputs, in_products(self.weight, dtype)
+    bias, weight = (
+      in_products(part, inputs.dtype) for part in (self.bias, self.weight)
     )
+    if len(weight) == 1:  # a plain product is faster than a batched
+      rows = inputs.reshape(-1, inputs.shape[-1])
+      return torch.addmm(bias.squeeze(0), rows, weight.squeeze(0))[None]
+    if inputs.dim() == 2:
+      inputs = inputs.expand(len(weight), *inputs.shape)
+    return torch.baddbmm(bias, inputs, weight)
 
   def one(self, inputs: torch.Tensor, group: int) -> torch.Tensor:
     """Applies layer `group` alone to [B, I]; returns [B, outputs]."""

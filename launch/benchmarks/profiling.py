@@ -36,7 +36,7 @@ def time_shares(agent) -> dict[str, float]:
   parts = {
     "sampling": (agent.batches, "draw"),
     "metrics": (agent._meter, "add"),
-    "backward": (torch.autograd, "backward"),
+    "backward": (torch.autograd, "grad"),
   }
   with contextlib.ExitStack() as stack:
     for part, (owner, name) in parts.items():

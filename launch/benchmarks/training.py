@@ -83,6 +83,7 @@ class _Run:
     return (self._progress.update - before) / (time.perf_counter() - start)
 
   def _train(self, steps: int, warmup_steps: int = 1) -> None:
+    self._progress.is_complete = False
     schedule = TrainSchedule(
       env_steps=self._progress.env_step + max(1, steps),
       log_every=self._config.log_every,

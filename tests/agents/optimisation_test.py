@@ -50,9 +50,10 @@ class AdamTest(parameterized.TestCase):
     for name, value in fresh.state_dict().items():
       torch.testing.assert_close(value, expected[name])
 
-  def test_parameters_used_in_both_dtypes_learn_from_both(self):
-    parameter = nn.Parameter(torch.ones(2))
-    flat = FlatParameters([parameter], torch.bfloat16)
-    copy = in_products(parameter, torch.bfloat16)
-    gradient = flat.backward((3 * parameter[0]) + (2 * copy[1]))
-    self.assertEqual(gradient.tolist(), [3.0, 2.0])
+  def test_parameters_learn_in_the_dtype_that_they_are_used_in(self):
+    wide, narrow, unused = (nn.Parameter(torch.ones(1)) for _ in range(3))
+    flat = FlatParameters([wide, narrow, unused], torch.bfloat16)
+    copy = in_products(narrow, torch.bfloat16)
+    self.assertEqual(copy.dtype, torch.bfloat16)
+    gradient = flat.differentiate((3 * wide + 2 * copy).sum())
+    self.assertEqual(gradient.tolist(), [3.0, 2.0, 0.0])
