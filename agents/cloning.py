@@ -1,11 +1,11 @@
 """Behaviour cloning of all intentions: pretraining, and BC itself."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
 import torch
 
-from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.batches import ExpertBatch
 from lfgp_dmc.agents.fields import OptimiserConfig
 from lfgp_dmc.agents.losses.behaviour_cloning import (
@@ -13,7 +13,7 @@ from lfgp_dmc.agents.losses.behaviour_cloning import (
   likelihood_loss,
 )
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
-from lfgp_dmc.agents.optimisation import clipped_step, make_optimiser
+from lfgp_dmc.agents.optimisation import Adam
 
 
 def cloning_loss(
@@ -37,36 +37,32 @@ class IntentionCloner:
     dtype: torch.dtype,
   ):
     self._network = network
-    self._parameters = network.trained_parameters()
-    self._optimiser = make_optimiser(
-      self._parameters, learning_rate, config.weight_decay
+    self._learning_rate = learning_rate
+    self._optimiser = Adam(
+      network.flat,
+      learning_rate,
+      config.weight_decay,
+      config.max_gradient_norm,
     )
-    self._max_gradient_norm = config.max_gradient_norm
     self._dtype = dtype
     self._loss = loss
-    self._schedule: torch.optim.lr_scheduler.LRScheduler | None = None
 
-  def anneal(self, updates: int) -> None:
-    """Anneals the step size to 0 over the updates, by a half cosine."""
-    self._schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
-      self._optimiser, updates
-    )
+  def anneal(self, done: float) -> None:
+    """Sets the step size on its half cosine to 0, of which a share is done."""
+    share = 0.5 * (1.0 + math.cos(math.pi * done))
+    self._optimiser.learning_rate = share * self._learning_rate
 
   def update(self, batch: ExpertBatch) -> dict[str, torch.Tensor]:
     """Makes one update on each task's own pairs; the loss's metrics."""
     mean, std = self._network(batch.inputs.to(self._dtype))
     loss, metrics = cloning_loss(self._loss, mean, std, batch.action)
-    clipped_step(
-      self._optimiser, loss, self._parameters, self._max_gradient_norm
-    )
-    if self._schedule is not None:
-      self._schedule.step()
+    self._optimiser.step(loss)
     return metrics
 
   def state_dict(self) -> dict[str, Any]:
     """The optimiser's moments (the network is the caller's)."""
-    return {"optimiser": serialisation.optimiser_state(self._optimiser)}
+    return {"optimiser": self._optimiser.state_dict()}
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
-    serialisation.load_optimiser_state(self._optimiser, state["optimiser"])
+    self._optimiser.load_state_dict(state["optimiser"])

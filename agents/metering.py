@@ -27,8 +27,9 @@ class Meter:
 
   def add(self, metrics: Mapping[str, torch.Tensor]) -> None:
     """Adds one update's metrics; KeyError for a name not announced."""
-    for name, value in metrics.items():
-      self._sums[name].add_(value)
+    sums = [self._sums[name] for name in metrics]
+    torch._foreach_add_(sums, list(metrics.values()))
+    for name in metrics:
       self._counts[name] += 1
 
   def read(self) -> dict[str, float]:

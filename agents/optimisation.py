@@ -1,63 +1,83 @@
-"""Small parts of every gradient step."""
+"""Steps down a gradient: Adam on parameters that lie flat."""
 
-import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
 import torch
-from torch import nn
+
+from lfgp_dmc.agents.networks.flat import FlatParameters
+
+_BETAS, _EPSILON = (0.9, 0.999), 1e-8
+_MOMENTS = ("exp_avg", "exp_avg_sq")
 
 
-def make_optimiser(
-  parameters: Sequence[nn.Parameter],
-  learning_rate: float,
-  weight_decay: float = 0.0,
-) -> torch.optim.Optimizer:
+class Adam:
   """Adam with torch's defaults, or AdamW if there is a weight decay.
 
-  On a GPU its count of steps is there too, so that steps can be recorded.
+  Calls torch's fused step itself: on networks as small as these,
+  `torch.optim.Adam` takes longer to find its parameters than to step them. All
+  that changes is a tensor, so that steps can be recorded on a GPU.
   """
-  kind = torch.optim.AdamW if weight_decay else torch.optim.Adam
-  return kind(
-    parameters,
-    learning_rate,
-    weight_decay=weight_decay,
-    fused=True,
-    capturable=parameters[0].is_cuda,
-  )
 
+  def __init__(
+    self,
+    parameters: FlatParameters,
+    learning_rate: float,
+    weight_decay: float = 0.0,
+    max_gradient_norm: float = 0.0,
+  ):
+    """`max_gradient_norm` bounds that of all parameters together; 0: none."""
+    self.learning_rate = learning_rate
+    self._parameters = parameters
+    self._weight_decay = weight_decay
+    self._max_norm = max_gradient_norm
+    values = parameters.values
+    self._state = {name: torch.zeros_like(values) for name in _MOMENTS}
+    self._state["step"] = torch.zeros((), device=values.device)
 
-def clipped_step(
-  optimiser: torch.optim.Optimizer,
-  loss: torch.Tensor,
-  parameters: Sequence[nn.Parameter],
-  max_norm: float,
-) -> torch.Tensor:
-  """Makes one step down the gradient; returns its norm before clipping.
+  def step(self, loss: torch.Tensor) -> torch.Tensor:
+    """Makes one step down the gradient; returns its norm before clipping."""
+    gradient = self._parameters.differentiate(loss)
+    norm = torch.linalg.vector_norm(gradient)
+    too_long = None
+    if self._max_norm:  # what the step divides the gradient by
+      too_long = ((norm + 1e-6) / self._max_norm).clamp_(min=1.0)
+    step = torch._fused_adamw_ if self._weight_decay else torch._fused_adam_
+    self._state["step"] += 1
+    step(
+      [self._parameters.values],
+      [gradient],
+      [self._state["exp_avg"]],
+      [self._state["exp_avg_sq"]],
+      [],
+      [self._state["step"]],
+      lr=self.learning_rate,
+      beta1=_BETAS[0],
+      beta2=_BETAS[1],
+      weight_decay=self._weight_decay,
+      eps=_EPSILON,
+      amsgrad=False,
+      maximize=False,
+      grad_scale=too_long,
+    )
+    self._parameters.refresh()
+    return norm
 
-  The gradient is that of all parameters together; `max_norm` 0: no bound.
-  """
-  optimiser.zero_grad()
-  loss.backward()
-  norm = nn.utils.clip_grad_norm_(parameters, max_norm or math.inf)
-  optimiser.step()
-  return norm.detach()
+  def state_dict(self) -> dict[str, Any]:
+    """Moments and the count of steps."""
+    return {k: v.cpu().numpy().copy() for k, v in self._state.items()}
 
-
-@contextmanager
-def frozen(parameters: Sequence[nn.Parameter]) -> Iterator[None]:
-  """Inside, gradients flow through, but not to, these parameters."""
-  for parameter in parameters:
-    parameter.requires_grad_(False)
-  try:
-    yield
-  finally:
-    for parameter in parameters:
-      parameter.requires_grad_(True)
-
-
-def polyak(target: nn.Module, online: nn.Module, share: float) -> None:
-  """Moves the target's parameters by `share` of the way to the online ones."""
-  targets: list[torch.Tensor] = list(target.parameters())
-  sources: list[torch.Tensor] = [p.detach() for p in online.parameters()]
-  torch._foreach_lerp_(targets, sources, share)
+  def load_state_dict(self, state: Mapping[str, Any]) -> None:
+    """Restores what `state_dict` returned, or an older run's, by parameter."""
+    if "step" not in state:
+      parts = [state[str(index)] for index in range(len(state))]
+      state = {
+        "step": parts[0]["step"],
+        **{
+          name: np.concatenate([np.ravel(part[name]) for part in parts])
+          for name in _MOMENTS
+        },
+      }
+    for name, tensor in self._state.items():
+      tensor.copy_(torch.from_numpy(np.array(state[name])))

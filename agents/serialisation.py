@@ -1,7 +1,6 @@
 """States as nested dicts of NumPy arrays and JSON-able values."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import torch
@@ -33,28 +32,3 @@ def load_module_state(
   module.load_state_dict(
     {name: torch.from_numpy(np.array(state[name])) for name in own}
   )
-
-
-def optimiser_state(optimiser: torch.optim.Optimizer) -> dict[str, Any]:
-  """An optimiser's moments: parameter index (as str) -> name -> array."""
-  state = optimiser.state_dict()["state"]
-  return {
-    str(index): {
-      name: value.detach().cpu().numpy().copy() for name, value in entry.items()
-    }
-    for index, entry in state.items()
-  }
-
-
-def load_optimiser_state(
-  optimiser: torch.optim.Optimizer, state: Mapping[str, Any]
-) -> None:
-  """Restores what `optimiser_state` returned; settings stay as built."""
-  moments = {
-    int(index): {
-      name: torch.from_numpy(np.array(value)) for name, value in entry.items()
-    }
-    for index, entry in state.items()
-  }
-  groups = optimiser.state_dict()["param_groups"]
-  optimiser.load_state_dict({"state": moments, "param_groups": groups})

@@ -1,5 +1,6 @@
 """Measures this machine; prints name=value lines.
 
+python launch/benchmark.py --what=bars --output=bars.csv
 python launch/benchmark.py --what=environment
 python launch/benchmark.py --what=learner --preset=fast
 python launch/benchmark.py --what=training --preset=fast
@@ -8,9 +9,12 @@ python launch/benchmark.py --what=memory --steps=20000
 python launch/benchmark.py --what=stability --steps=200000 --tasks=stack,reach
 """
 
+import contextlib
 import functools
 import importlib
+import itertools
 import pathlib
+import platform
 from collections.abc import Iterator
 
 from absl import flags
@@ -20,10 +24,12 @@ from lfgp_dmc.data import csv_files, files
 from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
 
+_COLUMNS = ("name", "value", "bar")  # the last of bars alone
 _DEFAULT_STEPS = {
+  "bars": 900,
   "environment": 7_200,
   "learner": 0,  # it is timed instead
-  "training": 1_000,
+  "training": 900,
   "acting": 50,
   "memory": 20_000,
   "stability": 200_000,
@@ -33,18 +39,20 @@ _WHAT = flags.DEFINE_enum(
   "what",
   "environment",
   list(_DEFAULT_STEPS),
+  "bars: what the presets' users wait for, beside what it should be, in five "
+  "minutes of an idle machine. "
   "environment: control steps a second through dm_env, the physics' alone, a "
   "reset's time. learner: updates a second, against "
-  "matrix products. training: the whole loop, against the learner alone. "
-  "acting: evaluation and collection. "
+  "matrix products. training: the whole loop, against the learner alone, and "
+  "beside a busy process. acting: evaluation and collection. "
   "memory: with a full replay on disk. stability: random steps that count NaN, "
   "MuJoCo's warnings and lost blocks.",
 )
 _STEPS = flags.DEFINE_integer(
   "steps",
   0,
-  "Control steps; default: 7200 (environment), 1000 (training), 200000 a task "
-  "(stability); of memory: updates, default 20000; of acting: episodes an "
+  "Control steps; default: 7200 (environment), 900 (bars, training), 200000 a "
+  "task (stability); of memory: updates, default 20000; of acting: episodes an "
   "intention, default 50.",
   lower_bound=0,
 )
@@ -55,7 +63,7 @@ _SEED = flags.DEFINE_integer("seed", 0, "Of resets and actions.", lower_bound=0)
 _SECONDS = flags.DEFINE_float(
   "seconds", 8.0, "Of each measurement of updates.", lower_bound=0.0
 )
-_OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file: name, value.")
+_OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file.")
 
 
 def main() -> None:
@@ -70,19 +78,34 @@ def main() -> None:
   with command.checked_input():
     config = config_flags.resolved()
   rows = []
-  for name, value in _measurements(config):
-    text = f"{value:.0f}" if value == round(value) else f"{value:.4g}"
-    print(f"{name}={text}", flush=True)
-    rows.append({"name": name, "value": text})
+  machine = ("machine", f"{_processor()}; {command.cores()} cores")
+  for row in itertools.chain([machine], _measurements(config)):
+    texts = [value if isinstance(value, str) else _text(value) for value in row]
+    print("=".join(texts[:2]), *texts[2:], flush=True)
+    rows.append(dict(zip(_COLUMNS, texts, strict=False)))
   if output:
     output.parent.mkdir(parents=True, exist_ok=True)
-    csv_files.write(output, ("name", "value"), rows)
+    csv_files.write(output, list(rows[-1]), rows)
 
 
-def _measurements(config: configs.RunConfig) -> Iterator[tuple[str, float]]:
+def _text(value: float) -> str:
+  return f"{value:.0f}" if value == round(value) else f"{value:.4g}"
+
+
+def _processor() -> str:
+  """The processor's name, as far as the system tells."""
+  with contextlib.suppress(OSError):
+    for line in pathlib.Path("/proc/cpuinfo").read_text().splitlines():
+      if line.startswith("model name"):
+        return line.partition(":")[2].strip()
+  return platform.processor() or platform.machine()
+
+
+def _measurements(config: configs.RunConfig) -> Iterator[tuple]:
   what, seed, seconds = _WHAT.value, _SEED.value, _SECONDS.value
   steps = _STEPS.value or _DEFAULT_STEPS[what]
   arguments: dict[str, tuple] = {
+    "bars": (steps, seconds),
     "environment": (steps, seed),
     "learner": (config, seconds),
     "training": (config, steps, seconds),

@@ -136,6 +136,7 @@ class BcAgent:
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
     serialisation.load_module_state(self._network, state["network"], "network")
+    self._network.flat.refresh()
     serialisation.load_module_state(self._best, state["best"], "best network")
     self._cloner.load_state_dict(state["cloner"])
     self._meter.load_state_dict(state["meter"])
@@ -170,7 +171,6 @@ def build(
   """
   del replay, unused
   device = torch.device(device)
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   encoder, seen = None, config.encoder
   if frame_shape:
@@ -193,6 +193,8 @@ def build(
     initial,
     encoder=encoder,
   ).to(device)
+  dtype = torch.bfloat16 if bfloat16 else torch.float32
+  network.flatten(dtype)
   split, share = seeding.generator(seed, "split"), config.validation_share
   which = demonstrations, tasks, standardiser, share, split
   if encoder is None:

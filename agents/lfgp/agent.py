@@ -71,7 +71,7 @@ class LfgpAgent:
     )
     if std := self._pretraining.config.std:
       self.learner.networks.intentions.heads.set_std(std)
-    self._refresh_inputs()
+    self._refresh()
 
   def carry_over(
     self,
@@ -109,7 +109,7 @@ class LfgpAgent:
       source_tasks = (self.tasks[0], *others)
     own = self.learner.networks
     transfer.carry_networks(own, networks, self.tasks, source_tasks)
-    self._refresh_inputs()
+    self._refresh()
     if is_any_new:
       self._first_updates = updates
 
@@ -199,7 +199,7 @@ class LfgpAgent:
     self._acting.bit_generator.state = state["acting"]
     self.batches.generator.bit_generator.state = state["sampling"]
     self._has_started = bool(state["has_started"])
-    self._refresh_inputs()
+    self._refresh()
     self._episode_step = 0
 
   def _check_common(self, source_tasks: Sequence[str], what: str) -> None:
@@ -209,7 +209,8 @@ class LfgpAgent:
         f"{', '.join(source_tasks)}"
       )
 
-  def _refresh_inputs(self) -> None:
-    """After the standardiser has changed."""
+  def _refresh(self) -> None:
+    """After standardiser and networks have changed."""
+    self.learner.networks.refresh()
     if self._experts is not None:
       self._experts.refresh()

@@ -63,14 +63,17 @@ class BatchMaker:
     return Draw(self._transitions(self._rows))
 
   def _with_experts(self, config: DiscriminatorReward, updates: int) -> Draw:
-    policy = expert = None
-    if updates % config.every == 0:
-      policy = self._transitions(self._rows)
-      finals = int(config.final_share * config.batch_size)
-      expert = self._pool.sample(self.generator, config.batch_size, finals)
     share = config.expert_share * config.expert_share_decay**updates
     rows = int(share * self._rows)
-    batch = self._transitions(self._rows - rows)
+    own, policy, expert = self._rows - rows, None, None
+    if updates % config.every == 0:  # both sides' rows in one draw
+      both = self._transitions(own + self._rows)[:3]
+      batch = Batch(*(part[:own] for part in both))
+      policy = Batch(*(part[own:] for part in both))
+      finals = int(config.final_share * config.batch_size)
+      expert = self._pool.sample(self.generator, config.batch_size, finals)
+    else:
+      batch = self._transitions(own)
     replayed = None if config.intentions_on_experts else batch
     if rows:
       shown = self._pool.sample_transitions(

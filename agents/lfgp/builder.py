@@ -102,6 +102,7 @@ def make_learner(
   `stored_columns` are the tasks' places among stored rewards, if those are
   used; products are of the dtype.
   """
+  networks.flatten(dtype)
   is_recorded = cuda_graphs and generator.device.type == "cuda"
   prior = None
   if networks.prior is not None:

@@ -12,7 +12,7 @@ from lfgp_dmc.agents.losses.critic import (
   value_penalty_loss,
 )
 from lfgp_dmc.agents.networks import tanh_gaussian
-from lfgp_dmc.agents.optimisation import clipped_step, make_optimiser, polyak
+from lfgp_dmc.agents.optimisation import Adam
 from lfgp_dmc.agents.value_bounds import ValueBounds
 
 
@@ -27,12 +27,13 @@ class CriticLearner:
   ):
     """`bounds` are the value penalty's."""
     self._networks, optimiser, self._generator, self._dtype = shared
-    parameters = list(self._networks.critics.parameters())
-    self.optimiser = make_optimiser(
-      parameters, config.learning_rate, optimiser.weight_decay
+    self._flat = self._networks.critics.flat
+    self.optimiser = Adam(
+      self._flat,
+      config.learning_rate,
+      optimiser.weight_decay,
+      optimiser.max_gradient_norm,
     )
-    self._parameters = parameters
-    self._max_gradient_norm = optimiser.max_gradient_norm
     self._config = config
     temperature = self._networks.log_temperature
     self.bounds = bounds(
@@ -55,9 +56,7 @@ class CriticLearner:
       )
       loss = loss + penalty
       metrics |= more
-    norm = clipped_step(
-      self.optimiser, loss, self._parameters, self._max_gradient_norm
-    )
+    norm = self.optimiser.step(loss)
     return metrics | {
       "gradient_norm/critic": norm,
       "reward": reward.mean(1),
@@ -66,8 +65,8 @@ class CriticLearner:
 
   def update_targets(self) -> None:
     """Moves the targets by `polyak` of the way to the critics."""
-    networks = self._networks
-    polyak(networks.target_critics, networks.critics, self._config.polyak)
+    target = self._networks.target_critics.flat
+    target.follow(self._flat, self._config.polyak)
 
   @torch.no_grad()
   def _target(self, batch: LabelledBatch) -> torch.Tensor:

@@ -14,7 +14,7 @@ from lfgp_dmc.agents.losses.discriminator import (
   mix,
 )
 from lfgp_dmc.agents.networks.discriminator import Discriminator
-from lfgp_dmc.agents.optimisation import make_optimiser
+from lfgp_dmc.agents.optimisation import Adam
 from lfgp_dmc.agents.rewards import reward_from_logits
 from lfgp_dmc.types import Episode
 
@@ -89,8 +89,8 @@ class _NetworkLearner:
     self, config: DiscriminatorReward, network: Discriminator, shared: Training
   ):
     _, optimiser, self._generator, self._dtype = shared
-    self.optimiser = make_optimiser(
-      list(network.parameters()), config.learning_rate, optimiser.weight_decay
+    self.optimiser = Adam(
+      network.flat, config.learning_rate, optimiser.weight_decay
     )
     self._config = config
     self._network = network
@@ -119,9 +119,7 @@ class _NetworkLearner:
       logits[:policy_rows], own.diagonal(dim1=0, dim2=2)
     )
     penalty, more = gradient_penalty_loss(gradient, config.gradient_penalty)
-    self.optimiser.zero_grad()
-    (loss + penalty).backward()
-    self.optimiser.step()
+    self.optimiser.step(loss + penalty)
     return metrics | more
 
   def rewards(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:

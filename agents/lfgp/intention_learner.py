@@ -10,7 +10,8 @@ from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.losses.intention import intention_loss, temperature_loss
 from lfgp_dmc.agents.networks import tanh_gaussian
-from lfgp_dmc.agents.optimisation import clipped_step, frozen, make_optimiser
+from lfgp_dmc.agents.networks.flat import FlatParameters
+from lfgp_dmc.agents.optimisation import Adam
 
 _SATURATED = 0.99
 
@@ -23,16 +24,19 @@ class IntentionLearner:
   ):
     self._networks, optimiser, self._generator, self._dtype = shared
     self.target_entropy = config.target_entropy
-    self._max_gradient_norm = optimiser.max_gradient_norm
+    max_norm = optimiser.max_gradient_norm
     self._prior = prior
-    self._critic_parameters = list(self._networks.critics.parameters())
-    self._parameters = self._networks.intentions.trained_parameters()
     self.optimisers = {
-      "policy": make_optimiser(
-        self._parameters, config.learning_rate, optimiser.weight_decay
+      "policy": Adam(
+        self._networks.intentions.flat,
+        config.learning_rate,
+        optimiser.weight_decay,
+        max_norm,
       ),
-      "temperature": make_optimiser(
-        [self._networks.log_temperature], config.temperature_learning_rate
+      "temperature": Adam(
+        FlatParameters([self._networks.log_temperature], torch.float32),
+        config.temperature_learning_rate,
+        max_gradient_norm=max_norm,
       ),
     }
 
@@ -40,14 +44,13 @@ class IntentionLearner:
     """One update of intentions, then of temperatures, on inputs [B, O]."""
     networks = self._networks
     inputs = inputs.to(self._dtype)
-    with frozen(self._critic_parameters):
-      critic_features = networks.critics.trunk(inputs)
-      features = critic_features
-      if networks.intentions.owns_trunk:
-        features = networks.intentions.trunk(inputs)
-      mean, std = networks.intentions.heads(features)
-      action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
-      q = networks.critics.heads(critic_features, action)
+    critic_features = networks.critics.trunk(inputs)
+    features = critic_features
+    if networks.intentions.owns_trunk:
+      features = networks.intentions.trunk(inputs)
+    mean, std = networks.intentions.heads(features)
+    action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
+    q = networks.critics.heads(critic_features, action)
     loss, metrics = intention_loss(
       log_prob, q, networks.log_temperature.detach().exp()
     )
@@ -55,9 +58,7 @@ class IntentionLearner:
       values = functools.partial(networks.critics.heads, critic_features)
       term, more = self._prior(inputs, mean, std, q.detach(), values)
       loss, metrics = loss + term, metrics | more
-    norm = clipped_step(
-      self.optimisers["policy"], loss, self._parameters, self._max_gradient_norm
-    )
+    norm = self.optimisers["policy"].step(loss)
     saturated = (action.detach().abs() > _SATURATED).float()
     metrics |= {
       "gradient_norm/policy": norm,
@@ -68,10 +69,5 @@ class IntentionLearner:
   def _update_temperatures(self, log_prob: torch.Tensor) -> Metrics:
     parameter = self._networks.log_temperature
     loss, metrics = temperature_loss(parameter, log_prob, self.target_entropy)
-    norm = clipped_step(
-      self.optimisers["temperature"],
-      loss,
-      [parameter],
-      self._max_gradient_norm,
-    )
+    norm = self.optimisers["temperature"].step(loss)
     return metrics | {"gradient_norm/temperature": norm}

@@ -88,7 +88,7 @@ class LfgpLearner:
       },
       "log_temperature": temperature.cpu().numpy().copy(),
       "optimisers": {
-        name: serialisation.optimiser_state(optimiser)
+        name: optimiser.state_dict()
         for name, optimiser in self._optimisers.items()
       },
       "generator": self._generator.get_state().numpy(),
@@ -104,12 +104,13 @@ class LfgpLearner:
     """
     for name, module in self.networks.modules().items():
       serialisation.load_module_state(module, state["networks"][name], name)
+    self.networks.refresh()
     with torch.no_grad():
       self.networks.log_temperature.copy_(
         torch.from_numpy(np.array(state["log_temperature"]))
       )
     for name, optimiser in self._optimisers.items():
-      serialisation.load_optimiser_state(optimiser, state["optimisers"][name])
+      optimiser.load_state_dict(state["optimisers"][name])
     self._generator.set_state(torch.from_numpy(np.array(state["generator"])))
     self.critics.bounds.load_state_dict(state["bounds"])
     self.updates = int(state["updates"])

@@ -14,6 +14,7 @@ from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.critics import CriticNetwork
 from lfgp_dmc.agents.networks.discriminator import Discriminator
 from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.networks.flat import FlatModule
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
@@ -33,10 +34,20 @@ class LfgpNetworks:
   discriminator: Discriminator | None = None
   prior: IntentionNetwork | None = None  # the first intentions, frozen
 
-  def modules(self) -> dict[str, nn.Module]:
+  def modules(self) -> dict[str, FlatModule]:
     """The modules by name, which checkpoints use."""
     fields = vars(self).items()
-    return {k: part for k, part in fields if isinstance(part, nn.Module)}
+    return {k: part for k, part in fields if isinstance(part, FlatModule)}
+
+  def flatten(self, dtype: torch.dtype) -> None:
+    """Lays each network's parameters out flat, for products of the dtype."""
+    for module in self.modules().values():
+      module.flatten(dtype)
+
+  def refresh(self) -> None:
+    """After parameters were written to by other means than steps."""
+    for module in self.modules().values():
+      module.flat.refresh()
 
 
 class Training(NamedTuple):
@@ -75,6 +86,8 @@ def make_networks(
     log_temperature=nn.Parameter(initial.repeat(tasks).to(device)),
     prior=_frozen_copy(intentions) if config.prior.weight else None,
   )
+  if networks.prior is not None:
+    networks.prior.owns_trunk = True  # a copy
   reward = config.reward
   if not isinstance(reward, DiscriminatorReward):
     return networks

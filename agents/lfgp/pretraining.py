@@ -39,7 +39,6 @@ class Pretraining:
     cloner = IntentionCloner(
       intentions, config.learning_rate, self.optimiser, config.loss, self.dtype
     )
-    cloner.anneal(config.updates)
     updates = progress_bars.bar(
       range(1, config.updates + 1),
       desc="pretraining",
@@ -47,9 +46,11 @@ class Pretraining:
       show=progress_bar,
     )
     for update in updates:
+      cloner.anneal((update - 1) / config.updates)
       metrics = cloner.update(experts.sample(generator, self.batch_size))
       if update % _LOG_EVERY == 0:
         loss = float(metrics["loss/behaviour_cloning"])
         updates.set_postfix(loss=f"{loss:.4f}")
     if config.std:  # the squared error does not determine it
       intentions.heads.set_std(config.std)
+      intentions.flat.refresh()

@@ -36,6 +36,7 @@ class Prior:
   def adopt(self, intentions: IntentionNetwork) -> None:
     """Copies the current intentions into the prior."""
     self._network.load_state_dict(intentions.state_dict())
+    self._network.flat.refresh()
 
   def fade(self, updates: int) -> None:
     """Decays the weight to its value after `updates`."""

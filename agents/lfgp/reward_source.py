@@ -9,6 +9,7 @@ import torch
 
 from lfgp_dmc.agents.batches import Batch, Draw
 from lfgp_dmc.agents.losses import Metrics
+from lfgp_dmc.agents.optimisation import Adam
 from lfgp_dmc.agents.value_bounds import ValueBounds
 from lfgp_dmc.types import Episode
 
@@ -32,7 +33,7 @@ class RewardSource:
   bounds: type[ValueBounds] = ValueBounds
 
   # By the names used in checkpoints.
-  optimisers: Mapping[str, torch.optim.Optimizer] = MappingProxyType({})
+  optimisers: Mapping[str, Adam] = MappingProxyType({})
 
   def update(self, draw: Draw) -> Metrics:
     """Trains the source, where there is something to train; its metrics."""

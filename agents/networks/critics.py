@@ -4,6 +4,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from lfgp_dmc.agents.networks.flat import FlatModule, in_products
 from lfgp_dmc.agents.networks.linear import StackedLinear, initialise_
 
 
@@ -56,19 +57,21 @@ class TwinCriticHeads(nn.Module):
     if action.dim() == 3:
       action = action.repeat(2, 1, 1)
     hidden = torch.baddbmm(
-      self.bias.to(dtype),
+      in_products(self.bias, dtype),
       features.expand(groups, *features.shape),
-      self.feature_weight.to(dtype),
+      in_products(self.feature_weight, dtype),
     )
     hidden.baddbmm_(  # in place: nobody needs the sum without it
       action.expand(groups, rows, action.shape[-1]),
-      self.action_weight.to(dtype),
+      in_products(self.action_weight, dtype),
     )
     if self.second is not None:
       hidden = self.second(hidden.relu_())
     if self.gain is not None and self.shift is not None:
       hidden = functional.layer_norm(hidden, hidden.shape[-1:])
-      hidden = hidden * self.gain.to(dtype) + self.shift.to(dtype)
+      hidden = torch.addcmul(
+        in_products(self.shift, dtype), hidden, in_products(self.gain, dtype)
+      )
     value = _single_outputs(hidden.relu_(), self.output)
     return value.float().reshape(2, self.tasks, rows)
 
@@ -85,7 +88,7 @@ def _single_outputs(hidden: torch.Tensor, layer: StackedLinear) -> torch.Tensor:
   return (hidden * weight).sum(-1) + layer.bias[..., 0]
 
 
-class CriticNetwork(nn.Module):
+class CriticNetwork(FlatModule):
   """Trunk and twin heads: the target network is a copy of the whole."""
 
   def __init__(self, trunk: nn.Module, heads: TwinCriticHeads):

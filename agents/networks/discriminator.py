@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 
 import torch
-from torch import nn
 
 from lfgp_dmc.agents.networks.discriminator_passes import (
   DiscriminatorPasses,
   tanh_,
 )
+from lfgp_dmc.agents.networks.flat import FlatModule, in_products
 from lfgp_dmc.agents.networks.linear import make_linear
 
 
-class Discriminator(nn.Module):
+class Discriminator(FlatModule):
   """(s, a) -> H tanh -> H tanh -> K logits.
 
   The k-th sigmoid is the probability that a pair comes from the expert of
@@ -67,6 +67,9 @@ class Discriminator(nn.Module):
     the pairs.
     """
     logits, gradient = DiscriminatorPasses.apply(
-      pairs, mixed.flatten(0, 1), per_task, *self.parameters()
+      pairs,
+      mixed.flatten(0, 1),
+      per_task,
+      *(in_products(p, pairs.dtype) for p in self.parameters()),
     )
     return logits, gradient.view(mixed.shape)

@@ -44,19 +44,15 @@ class DiscriminatorPasses(torch.autograd.Function):
     *parameters: torch.Tensor,
   ) -> tuple[torch.Tensor, torch.Tensor]:
     """Computes in the dtype of `pairs`; float32 results."""
-    dtype, (rows, width) = pairs.dtype, pairs.shape
-    weight_1, bias_1, weight_2, bias_2, weight_3, bias_3 = (
-      parameter.to(dtype) for parameter in parameters
-    )
+    rows, width = pairs.shape
+    weight_1, bias_1, weight_2, bias_2, weight_3, bias_3 = parameters
     filling = (0, -width % _ALIGNED)
     weight_1 = functional.pad(weight_1, filling)
     inputs = functional.pad(torch.cat([pairs, mixed]), filling)
     first = tanh_(torch.addmm(bias_1, inputs, weight_1.t()))
     second = tanh_(torch.addmm(bias_2, first, weight_2.t()))
     logits = torch.addmm(bias_3, second[:rows], weight_3.t())
-    one = torch.ones((), dtype=dtype, device=pairs.device)
-    slope_1 = torch.addcmul(one, first, first, value=-1)
-    slope_2 = torch.addcmul(one, second, second, value=-1)
+    slope_1, slope_2 = _slope(first), _slope(second)
     output = _output_weight(weight_3, per_task)
     by_second = (_blocks(slope_2[rows:], output) * output).flatten(0, 1)
     by_first_out = by_second @ weight_2
@@ -102,9 +98,14 @@ class DiscriminatorPasses(torch.autograd.Function):
       torch.addmm(before_2.t() @ first, by_second.t(), through_1),
       before_2.sum(0),
       by_logits.t() @ second[:rows] + by_output,
-      by[0].sum(0),
+      by_logits.sum(0),
     )
-    return (None, None, None, *(part.float() for part in gradients))
+    return (None, None, None, *gradients)
+
+
+def _slope(value: torch.Tensor) -> torch.Tensor:
+  """1 - value^2, the derivative of a tanh, rounded once."""
+  return torch.ones_like(value).addcmul_(value, value, value=-1)
 
 
 def _output_weight(weight: torch.Tensor, per_task: bool) -> torch.Tensor:

@@ -7,6 +7,7 @@ from torch import nn
 from torch.nn import functional
 
 from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.networks.flat import FlatModule
 from lfgp_dmc.agents.networks.linear import StackedLinear
 from lfgp_dmc.agents.networks.trunk import Standardiser
 
@@ -67,7 +68,7 @@ def to_std(raw: torch.Tensor) -> torch.Tensor:
   return functional.softplus(raw) + 1e-7
 
 
-class IntentionNetwork(nn.Module):
+class IntentionNetwork(FlatModule):
   """All that acting needs: standardisation, trunk, heads, any encoder."""
 
   def __init__(

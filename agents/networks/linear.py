@@ -6,6 +6,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from lfgp_dmc.agents.networks.flat import in_products
+
 
 def initialise_(
   parameter: torch.Tensor, fan_in: int, generator: torch.Generator
@@ -25,7 +27,9 @@ class Linear(nn.Linear):
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
     """Maps [..., inputs] to [..., outputs]."""
     dtype = inputs.dtype
-    return functional.linear(inputs, self.weight.to(dtype), self.bias.to(dtype))
+    return functional.linear(
+      inputs, in_products(self.weight, dtype), in_products(self.bias, dtype)
+    )
 
 
 def make_linear(
@@ -55,17 +59,21 @@ class StackedLinear(nn.Module):
 
     Maps [G, B, I], or [B, I] for the same rows in every group, to [G, B, O].
     """
-    if self.weight.shape[0] == 1:  # a plain product is faster than a batched
+    bias, weight = (
+      in_products(part, inputs.dtype) for part in (self.bias, self.weight)
+    )
+    if len(weight) == 1:  # a plain product is faster than a batched
       rows = inputs.reshape(-1, inputs.shape[-1])
-      return self.one(rows, 0)[None]
+      return torch.addmm(bias.squeeze(0), rows, weight.squeeze(0))[None]
     if inputs.dim() == 2:
-      inputs = inputs.expand(self.weight.shape[0], *inputs.shape)
-    dtype = inputs.dtype
-    return torch.baddbmm(self.bias.to(dtype), inputs, self.weight.to(dtype))
+      inputs = inputs.expand(len(weight), *inputs.shape)
+    return torch.baddbmm(bias, inputs, weight)
 
   def one(self, inputs: torch.Tensor, group: int) -> torch.Tensor:
     """Applies layer `group` alone to [B, I]; returns [B, outputs]."""
     dtype = inputs.dtype
     return torch.addmm(
-      self.bias[group].to(dtype), inputs, self.weight[group].to(dtype)
+      in_products(self.bias, dtype)[group],
+      inputs,
+      in_products(self.weight, dtype)[group],
     )

@@ -14,13 +14,13 @@ from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, PretrainingConfig
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch.benchmarks import profiling
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 
 _ACTION_SIZE = 4
 _PAIRS = 2_000  # a task
 _ROWS = 20_000  # of the replay
 _PRODUCTS = (12, 256, 256)  # the shape of both factors: the critics' own
-_BEST_OF = 20
 _ROUNDS = 5  # of updates and products in turns: a shared host's speed wanders
 _DTYPES = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
@@ -34,16 +34,13 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     `gflop/<term>` and their sum `gflop_per_update` (see `_gflop_of_update`);
     `updates_per_s_fp32_1thread` and so on, medians over rounds;
     `matmul_gflops_...`; `roofline_fraction_...`: the first times the second
-    over the third, median of the rounds' own; `share_<part>_...`: of the time.
+    over the third, median of the rounds' own; `products_gflops_...` and
+    `products_fraction_...`: the same against the products that an update really
+    makes, alone; `share_<part>_...`: of the time (see `profiling`).
   """
-  tasks = tasks_of(config)
-  assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
-  terms = _gflop_of_update(
-    config.agent, len(tasks), observations.OBSERVATION_SIZE, _ACTION_SIZE
-  )
-  for name, value in terms.items():
+  for name, value in _gflop_of_update(config).items():
     yield f"gflop/{name}", value
-  operations = 1e9 * sum(terms.values())
+  operations = operations_of_update(config)
   yield "gflop_per_update", operations / 1e9
   for threads in (1, 2):
     torch.set_num_threads(threads)
@@ -61,20 +58,32 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
         f"roofline_fraction_{suffix}",
         statistics.median(r * operations / p for r, p in rounds),
       )
-      for part, share in time_shares(agent, seconds / _ROUNDS).items():
+      own = profiling.product_rate(agent)
+      yield f"products_gflops_{suffix}", own / 1e9
+      yield (
+        f"products_fraction_{suffix}",
+        statistics.median(rates) * operations / own,
+      )
+      for part, share in profiling.time_shares(agent).items():
         yield f"share_{part}_{suffix}", share
 
 
-def _gflop_of_update(
-  config: LfgpConfig, tasks: int, observation_size: int, action_size: int
-) -> dict[str, float]:
-  """The terms of one update of K tasks, in GFLOP, by a fixed formula.
+def operations_of_update(run: RunConfig) -> float:
+  """The sum of the formula's terms."""
+  return 1e9 * sum(_gflop_of_update(run).values())
+
+
+def _gflop_of_update(run: RunConfig) -> dict[str, float]:
+  """The terms of one update, in GFLOP, by a fixed formula.
 
   What the plain equations ask for, 2 operations a multiply-add, whatever an
   implementation does or saves: a backward pass costs twice its forward pass (an
   input gradient alone once), and the gradient penalty, itself differentiated
   twice, six times its forward pass.
   """
+  config, tasks = run.agent, len(tasks_of(run))
+  assert isinstance(config, LfgpConfig), "of LfGP and its variants"
+  observation_size, action_size = observations.OBSERVATION_SIZE, _ACTION_SIZE
   hidden, rows = config.networks.hidden_size, config.batch_size
   shared = observation_size * hidden + hidden * hidden
   if config.networks.layout == layouts.SEPARATE:
@@ -110,11 +119,8 @@ def _gflop_of_update(
 def best_matmul_rate(dtype: torch.dtype) -> float:
   """Operations a second of batched products as large as the critics'."""
   left, right = (torch.randn(_PRODUCTS).to(dtype) for _ in range(2))
-  out, best = torch.empty(_PRODUCTS, dtype=dtype), float("inf")
-  for _ in range(_BEST_OF):
-    start = time.perf_counter()
-    torch.bmm(left, right, out=out)
-    best = min(best, time.perf_counter() - start)
+  out = torch.empty(_PRODUCTS, dtype=dtype)
+  best = profiling.best_time(lambda: torch.bmm(left, right, out=out))
   groups, rows, inner = _PRODUCTS
   return 2 * groups * rows * inner * inner / best
 
@@ -127,7 +133,10 @@ def tasks_of(config: RunConfig) -> tuple[str, ...]:
 
 
 def make_agent(config: RunConfig, replay: Replay | None = None):
-  """The config's agent, without pretraining; data that lack are made up."""
+  """The config's agent; data that lack are made up.
+
+  Without pretraining and the critics' head start.
+  """
   tasks = tasks_of(config)
   assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   size = observations.OBSERVATION_SIZE
@@ -136,7 +145,11 @@ def make_agent(config: RunConfig, replay: Replay | None = None):
     rewards = np.zeros((_ROWS, len(tasks)), np.float32)  # for SAC-X
     replay = synthetic.replay(rows, rewards, tasks)
   return ALGORITHMS[config.algorithm].build(
-    dataclasses.replace(config.agent, pretraining=PretrainingConfig()),
+    dataclasses.replace(
+      config.agent,
+      pretraining=PretrainingConfig(),
+      critic=dataclasses.replace(config.agent.critic, warmup_updates=0),
+    ),
     tasks,
     synthetic.demonstrations(tasks, _PAIRS, size, _ACTION_SIZE),
     replay,
@@ -146,40 +159,6 @@ def make_agent(config: RunConfig, replay: Replay | None = None):
     _ACTION_SIZE,
     bfloat16=config.bfloat16,
   )
-
-
-def time_shares(agent, seconds: float) -> dict[str, float]:
-  """How an update's time is divided: part -> share; `rest` is all else.
-
-  The agent keeps the timers.
-  """
-  spent: dict[str, float] = {}
-  learner = agent.learner
-  parts = {
-    "sampling": (agent.batches, "draw"),
-    "critics": (learner.critics, "update"),
-    "intentions": (learner.intentions, "update"),
-    "reward": (learner.reward, "update"),
-  }
-
-  def timed(part: str, call: Callable) -> Callable:
-    def wrapped(*arguments):
-      start = time.perf_counter()
-      result = call(*arguments)
-      spent[part] = spent.get(part, 0.0) + time.perf_counter() - start
-      return result
-
-    return wrapped
-
-  for part, (owner, name) in parts.items():
-    setattr(owner, name, timed(part, getattr(owner, name)))
-  start = time.perf_counter()
-  rate(agent.update, seconds)
-  total = time.perf_counter() - start
-  for owner, name in parts.values():
-    delattr(owner, name)  # the class's own again
-  spent["rest"] = total - sum(spent.values())
-  return {part: value / total for part, value in spent.items()}
 
 
 def rate(call: Callable[[], object], seconds: float) -> float:

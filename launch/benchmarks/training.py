@@ -1,6 +1,8 @@
 """Speed of the whole loop, acting included, against the learner's alone."""
 
-import functools
+import collections
+import contextlib
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -9,7 +11,6 @@ from collections.abc import Iterator
 
 import torch
 
-import lfgp_dmc
 from lfgp_dmc import observations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.benchmarks import learner
@@ -19,68 +20,90 @@ from lfgp_dmc.runs.metrics import MetricsLog
 from lfgp_dmc.runs.schedule import Progress, TrainSchedule
 
 _ACTION_SIZE = 4
-_EPISODE = 360
+_ROUNDS = 3  # of all measurements in turns: a shared host's speed wanders
 
 
 def measure(
   config: RunConfig, steps: int, seconds: float
 ) -> Iterator[tuple[str, float]]:
-  """Trains for `steps` steps after one episode without updates.
+  """Trains on one thread and on two, alone and beside a busy process.
 
-  Torch gets the number of threads with which the learner is faster, not the
-  config's. Updates alone are measured for about `seconds`, each time.
+  Each for `steps` steps, and for about `seconds` without acting.
 
   Yields:
-    `learner_updates_per_s_1thread`, `..._2threads`: of updates alone, before
-    the loop, `..._beside_busy` another process; `loop_threads`;
-    `loop_steps_per_s` and `loop_updates_per_s`: of the whole loop;
-    `learner_updates_per_s`: of updates alone once more, after it;
-    `loop_fraction`: the loop's updates a second over the faster of these.
+    Medians over rounds: `learner_updates_per_s_1thread` and `..._2threads`, of
+    updates alone; `loop_updates_per_s_...`, of the whole loop; their ratio
+    `loop_fraction_...`; `loop_updates_per_s_..._beside_busy`;
+    `second_thread_gain` and `..._beside_busy`, the loop's ratio of two to one.
   """
-  replay = Replay(steps + _EPISODE, observations.OBSERVATION_SIZE, _ACTION_SIZE)
-  agent = learner.make_agent(config, replay)
-  environment = lfgp_dmc.load(config.main_task, seed=config.seed)
-  train = functools.partial(_train, config, environment, agent, replay)
-  progress = train(_EPISODE, None)
-  rates = {}
-  for threads in (1, 2):
-    torch.set_num_threads(threads)
-    name = f"learner_updates_per_s_{threads}thread{'s'[: threads - 1]}"
-    rates[threads] = learner.rate(agent.update, seconds)
-    yield name, rates[threads]
-    with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
-      try:
-        yield f"{name}_beside_busy", learner.rate(agent.update, seconds)
-      finally:
-        busy.kill()
-  threads = max(rates, key=rates.__getitem__)
-  torch.set_num_threads(threads)
-  yield "loop_threads", threads
-  before = progress.update
-  start = time.perf_counter()
-  progress = train(_EPISODE + steps, progress)
-  elapsed = time.perf_counter() - start
-  yield "loop_steps_per_s", steps / elapsed
-  updates = (progress.update - before) / elapsed
-  yield "loop_updates_per_s", updates
-  again = learner.rate(agent.update, seconds)
-  yield "learner_updates_per_s", again
-  yield "loop_fraction", updates / max(again, rates[threads])
-  environment.close()
+  run = _Run(config, steps)
+  found = collections.defaultdict(list)
+  for _ in range(_ROUNDS):
+    row = {}
+    for threads in (1, 2):
+      torch.set_num_threads(threads)
+      suffix = f"{threads}thread{'s'[: threads - 1]}"
+      alone = learner.rate(run.agent.update, seconds / _ROUNDS)
+      row[f"learner_updates_per_s_{suffix}"] = alone
+      whole = row[f"loop_updates_per_s_{suffix}"] = run.rate(steps // _ROUNDS)
+      row[f"loop_fraction_{suffix}"] = whole / alone
+      with _busy_process():
+        whole = run.rate(steps // _ROUNDS)
+      row[f"loop_updates_per_s_{suffix}_beside_busy"] = whole
+    for state in ("", "_beside_busy"):
+      one, two = (
+        row[f"loop_updates_per_s_{suffix}{state}"]
+        for suffix in ("1thread", "2threads")
+      )
+      row[f"second_thread_gain{state}"] = two / one
+    for name, value in row.items():
+      found[name].append(value)
+  for name, values in found.items():
+    yield name, statistics.median(values)
 
 
-def _train(config, environment, agent, replay, env_steps, progress) -> Progress:
-  schedule = TrainSchedule(
-    env_steps=env_steps,
-    log_every=config.log_every,
-    warmup_steps=_EPISODE + 1,
-    updates_per_step=config.updates_per_step,
-    progress_bar=False,
-  )
-  with tempfile.TemporaryDirectory() as folder:
-    log = MetricsLog(folder)
-    progress = loop.EpisodeRounds(
-      environment, agent, replay, schedule, log, progress
-    ).run()
-    log.close()
-  return progress
+class _Run:
+  """A run that goes on each time."""
+
+  def __init__(self, config: RunConfig, steps: int):
+    """Fills the replay with what the first update needs."""
+    self._config, self._progress = config, Progress()
+    first = config.agent.batch_size
+    self._replay = Replay(
+      4 * steps + first, observations.OBSERVATION_SIZE, _ACTION_SIZE
+    )
+    self.agent = learner.make_agent(config, self._replay)
+    self._environment = config.environment_spec.build(seed=config.seed)
+    self._train(first, warmup_steps=first + 1)
+
+  def rate(self, steps: int) -> float:
+    """Updates a second over some more steps."""
+    before, start = self._progress.update, time.perf_counter()
+    self._train(steps)
+    return (self._progress.update - before) / (time.perf_counter() - start)
+
+  def _train(self, steps: int, warmup_steps: int = 1) -> None:
+    self._progress.is_complete = False
+    schedule = TrainSchedule(
+      env_steps=self._progress.env_step + max(1, steps),
+      log_every=self._config.log_every,
+      warmup_steps=warmup_steps,
+      updates_per_step=self._config.updates_per_step,
+      progress_bar=False,
+    )
+    with tempfile.TemporaryDirectory() as folder:
+      log = MetricsLog(folder)
+      self._progress = loop.EpisodeRounds(
+        self._environment, self.agent, self._replay, schedule, log,
+        self._progress,
+      ).run()  # fmt: skip
+      log.close()
+
+
+@contextlib.contextmanager
+def _busy_process() -> Iterator[None]:
+  with subprocess.Popen([sys.executable, "-c", "while True: pass"]) as busy:
+    try:
+      yield
+    finally:
+      busy.kill()

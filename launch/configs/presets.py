@@ -31,11 +31,10 @@ _RAL: dict[str, Any] = {
 # stay near it; discriminators recognise a task's end, from positions alone,
 # since velocities and history give away whose success it is.
 _FAST: dict[str, Any] = {
-  "bfloat16": True,
   "control_hz": 5,
   "random_steps": 0,
   "warm_up": 1800,
-  "agent.batch_size": 128,
+  "agent.batch_size": 64,
   "agent.critic.discount": 0.97,
   "agent.critic.polyak": 0.01,
   "agent.critic.warmup_updates": 3000,
@@ -45,12 +44,13 @@ _FAST: dict[str, Any] = {
   "agent.intention.temperature_learning_rate": 0.001,
   "agent.networks.actor_trunk": "own",
   "agent.networks.critic_layer_norm": True,
+  "agent.networks.hidden_size": 128,
   "agent.pretraining.std": 0.1,
   "agent.pretraining.updates": 10_000,
   "agent.prior.normalise": True,
   "agent.prior.weight": 5.0,
   "agent.reward.kind": "discriminator",
-  "agent.reward.batch_size": 32,
+  "agent.reward.batch_size": 16,
   "agent.reward.clip": 5.0,
   "agent.reward.expert_share": 0.25,
   "agent.reward.final_share": 1.0,
@@ -62,11 +62,21 @@ _FAST: dict[str, Any] = {
   "agent.scheduler.kind": "weighted_random",
 }
 
+# Wide, for tasks on which narrow networks were not tried: three times as long
+# an update.
+_WIDE: dict[str, Any] = {
+  **_FAST,
+  "bfloat16": True,
+  "agent.batch_size": 128,
+  "agent.networks.hidden_size": 256,
+  "agent.reward.batch_size": 32,
+}
+
 # Where millimetres decide (Bring, Insert): cloning by likelihood, a divergence
 # as the prior (which has an entropy term of its own: the temperature is to
 # vanish), and a discriminator of the main task's own, on blue and the fingers.
 _FAST_PRECISE: dict[str, Any] = {
-  **_FAST,
+  **_WIDE,
   "env_steps": 40_000,
   "mirror_demonstrations": True,
   "replay_capacity": 40_000,
@@ -91,7 +101,7 @@ _FAST_PRECISE: dict[str, Any] = {
 # encoder and start as it left off (init_from). Their observations are what the
 # robot senses, 18 floats, and features, which are standardised already.
 _PIXELS: dict[str, Any] = {
-  **_FAST,
+  **_WIDE,
   "camera_size": 64,
   "env_steps": 40_000,
   "evaluate_every": 10_000,
@@ -109,14 +119,12 @@ _PIXELS: dict[str, Any] = {
 # steps, of which there are two an update; a prior holds where they prefer it.
 _FEW: dict[str, Any] = {
   **_FAST,
-  "bfloat16": False,
   "env_steps": 72_000,
   "mirror_demonstrations": True,
   "replay_capacity": 72_000,
   "shifted_copies": 30,
   "updates_per_step": 0.5,
   "warm_up": 6000,
-  "agent.batch_size": 64,
   "agent.critic.learning_rate": 0.001,
   "agent.critic.polyak": 0.03,
   "agent.critic.warmup_updates": 4000,
@@ -124,14 +132,12 @@ _FEW: dict[str, Any] = {
   "agent.intention.initial_temperature": 0.001,
   "agent.intention.target_entropy": -8.0,
   "agent.intention.temperature_learning_rate": 0.0003,
-  "agent.networks.hidden_size": 128,
   "agent.networks.layout": "separate",
   "agent.pretraining.learning_rate": 0.001,
   "agent.pretraining.std": 0.15,
   "agent.pretraining.updates": 3000,
   "agent.prior.q_filter": True,
   "agent.prior.weight": 1.0,
-  "agent.reward.batch_size": 16,
   "agent.reward.every": 2,
   "agent.reward.expert_share": 0.5,
   "agent.reward.gradient_penalty": 0.03,

@@ -88,8 +88,10 @@ class Plain:
     return state
 
   def intention(self, k, state, noise):
-    heads = self.networks.intentions.heads
-    hidden = self.trunk(self.networks.intentions.trunk, state).detach()
+    network = self.networks.intentions
+    heads, hidden = network.heads, self.trunk(network.trunk, state)
+    if not network.owns_trunk:
+      hidden = hidden.detach()
     for layer in (heads.hidden, heads.second):
       if layer is not None:
         hidden = torch.relu(_own(hidden, layer, k))
@@ -107,6 +109,9 @@ class Plain:
     hidden = torch.cat([features, action], 1) @ weight + heads.bias[g]
     if heads.second is not None:
       hidden = _own(torch.relu(hidden), heads.second, g)
+    if heads.gain is not None:
+      hidden = functional.layer_norm(hidden, (H,))
+      hidden = hidden * heads.gain[g] + heads.shift[g]
     return _own(torch.relu(hidden), heads.output, g)[:, 0]
 
   def critic_loss(self, batch):
@@ -143,7 +148,11 @@ class Plain:
 
 
 class PlainUpdateTest(parameterized.TestCase):
-  @parameterized.parameters({}, {"networks.layout": "separate"})
+  @parameterized.parameters(
+    {},
+    {"networks.layout": "separate"},
+    {"networks.actor_trunk": "own", "networks.critic_layer_norm": True},
+  )
   def test_losses_and_gradients_equal_the_equations(self, **fields):
     learner = _learner(**fields)
     networks = learner.networks
@@ -155,10 +164,13 @@ class PlainUpdateTest(parameterized.TestCase):
     plain = Plain(networks, noise)
     policy_pairs = torch.cat([other.inputs, other.action], 1)
     expert_pairs = torch.cat([expert.inputs, expert.action], 2)
+    policy = networks.intentions
+    if not policy.owns_trunk:
+      policy = policy.heads
     parts = {
       "discriminator": list(networks.discriminator.parameters()),
       "critic": list(networks.critics.parameters()),
-      "policy": list(networks.intentions.heads.parameters()),
+      "policy": list(policy.parameters()),
       "temperature": [networks.log_temperature],
     }
     # In the order in which the update draws its noise.

@@ -184,7 +184,12 @@ class BlockRunTest(absltest.TestCase):
       ["steps", "nan", "warnings", "blocks_out", "max_block_speed"], names[1]
     )
     self.assertContainsSubset(
-      ["loop_steps_per_s", "learner_updates_per_s", "loop_fraction"], names[2]
+      [
+        "learner_updates_per_s_1thread",
+        "loop_fraction_2threads",
+        "second_thread_gain_beside_busy",
+      ],
+      names[2],
     )
     self.assertContainsSubset(
       [
@@ -202,6 +207,8 @@ class BlockRunTest(absltest.TestCase):
 
 def _names(done: subprocess.CompletedProcess) -> list[str]:
   assert not done.returncode, done.stderr
-  for line in done.stdout.splitlines():
+  machine, *lines = done.stdout.splitlines()
+  assert machine.startswith("machine="), machine
+  for line in lines:
     float(line.partition("=")[2])
-  return [line.partition("=")[0] for line in done.stdout.splitlines()]
+  return [line.partition("=")[0] for line in lines]
