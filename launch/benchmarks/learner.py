@@ -36,7 +36,7 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     `matmul_gflops_...`; `roofline_fraction_...`: the first times the second
     over the third, median of the rounds' own; `products_gflops_...` and
     `products_fraction_...`: the same against the products that an update really
-    makes, alone; `share_<part>_...`: of the time (see `profiling`).
+    makes, alone; `share_<part>_...`: of one thread's time (see `profiling`).
   """
   for name, value in _gflop_of_update(config).items():
     yield f"gflop/{name}", value
@@ -64,8 +64,9 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
         f"products_fraction_{suffix}",
         statistics.median(rates) * operations / own,
       )
-      for part, share in profiling.time_shares(agent).items():
-        yield f"share_{part}_{suffix}", share
+      if threads == 1:
+        for part, share in profiling.time_shares(agent).items():
+          yield f"share_{part}_{suffix}", share
 
 
 def operations_of_update(run: RunConfig) -> float:

@@ -10,7 +10,7 @@ import torch
 from torch.profiler import ProfilerActivity, profile, record_function
 from torch.utils._python_dispatch import TorchDispatchMode
 
-_UPDATES = 20  # that are profiled
+_UPDATES = 10  # that are profiled
 _BEST_OF = 20
 _PRODUCTS = {"mm", "addmm", "addmm_", "bmm", "baddbmm", "baddbmm_"}
 _OPTIMISERS = ("_fused_adam", "lerp_", "linalg_vector_norm")
