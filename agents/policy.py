@@ -4,63 +4,20 @@ In NumPy: a product of one row takes no library of networks, and what acts
 starts at once, wherever it runs.
 """
 
-import dataclasses
 import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import pydantic
-from pydantic import Field
 
 from lfgp_dmc.agents import fields, vision
-from lfgp_dmc.agents.fields import NetworksConfig
+from lfgp_dmc.agents import policy_options as names
+from lfgp_dmc.agents.policy_options import PolicyOptions
 from lfgp_dmc.data import array_files, files
 from lfgp_dmc.runs.run_folder import ARRAYS_NAME, CONFIG_NAME, POLICY_FIELD
-
-_MEAN, _STD = "standardiser.mean", "standardiser.deviation"
-_HEADS, _OUTPUT = "heads.", "heads.output"
-_SECOND = "heads.second"  # of the layout without a trunk
-# With ReLU, in order, those that there are.
-_HIDDEN = ("trunk.first", "trunk.second", "heads.hidden", _SECOND)
-
-
-@fields.checked
-class PolicyOptions(NetworksConfig):
-  """What goes with a policy's arrays."""
-
-  tasks: Annotated[list[fields.Text], Field(min_length=1)]
-  observation_size: fields.PositiveInt
-  action_size: fields.PositiveInt
-  tanh_feature_scale: fields.NonNegative = 0.0
-  # Of an encoder: [C, H, W, 3] of frames, of which it makes the last features
-  # of an observation, and its channels.
-  frame_shape: list[fields.PositiveInt] = dataclasses.field(
-    default_factory=list
-  )
-  features: fields.Count = 0
-  channels: fields.Count = 0
-  env_step: fields.Count = 0  # how long it was trained
-
-  def shapes(self) -> dict[str, tuple[int, ...]]:
-    """Of the arrays by name: a network's own."""
-    size, hidden, tasks = self.observation_size, self.hidden_size, self.tasks
-    inputs = size * (2 if self.tanh_feature_scale else 1)
-    shapes: dict[str, tuple[int, ...]] = {_MEAN: (size,), _STD: (size,)}
-    widths = {"heads.hidden": inputs, _SECOND: hidden}
-    if self.layout == "shared_trunk":
-      for name, width in (("trunk.first", inputs), ("trunk.second", hidden)):
-        shapes |= {f"{name}.weight": (hidden, width), f"{name}.bias": (hidden,)}
-      widths = {"heads.hidden": hidden}
-    for name, width in (*widths.items(), (_OUTPUT, hidden)):
-      out = 2 * self.action_size if name == _OUTPUT else hidden
-      shapes[f"{name}.weight"] = (len(tasks), width, out)
-      shapes[f"{name}.bias"] = (len(tasks), 1, out)
-    if self.frame_shape:
-      shapes |= vision.shapes(self.frame_shape, self.features, self.channels)
-    return shapes
 
 
 class Policy:
@@ -87,7 +44,7 @@ class Policy:
     self.frame_shape = tuple(frame_shape)
     self._arrays = arrays
     self._scale = tanh_feature_scale
-    self._hidden = [name for name in _HIDDEN if f"{name}.weight" in arrays]
+    self._hidden = [name for name in names.HIDDEN if f"{name}.weight" in arrays]
     self._task = self.tasks[0]
     self._generator = np.random.default_rng(0)
 
@@ -163,7 +120,7 @@ class Policy:
   def options(self) -> dict[str, Any]:
     """The JSON-able options that `from_arrays` takes beside the arrays."""
     shapes = {name: array.shape for name, array in self._arrays.items()}
-    is_separate = f"{_SECOND}.weight" in shapes
+    is_separate = f"{names.SECOND}.weight" in shapes
     seen = {}
     if self.frame_shape:
       seen = {
@@ -173,9 +130,9 @@ class Policy:
       }
     return seen | {
       "tasks": list(self.tasks),
-      "observation_size": shapes[_MEAN][0],
+      "observation_size": shapes[names.MEAN][0],
       "action_size": self.action_size,
-      "hidden_size": shapes[f"{_OUTPUT}.weight"][1],
+      "hidden_size": shapes[f"{names.OUTPUT}.weight"][1],
       "layout": "separate" if is_separate else "shared_trunk",
       "tanh_feature_scale": self._scale,
     }
@@ -183,7 +140,7 @@ class Policy:
   @property
   def action_size(self) -> int:
     """A, floats of an action."""
-    return self._arrays[f"{_OUTPUT}.weight"].shape[-1] // 2
+    return self._arrays[f"{names.OUTPUT}.weight"].shape[-1] // 2
 
   def begin(self, task: str, seed: int) -> None:
     """Starts an attempt at `task`; samples follow from `seed`.
@@ -217,7 +174,7 @@ class Policy:
     if deterministic is None:
       deterministic = self.deterministic
     raw = np.asarray(observation, np.float32)
-    width = self._arrays[_MEAN].shape[0]
+    width = self._arrays[names.MEAN].shape[0]
     encodes = bool(self.frame_shape) and raw.shape[-1:] != (width,)
     if encodes:
       own = width - len(self._read("encoder.output.bias"))
@@ -244,23 +201,25 @@ class Policy:
 
   def _gaussian(self, raw: np.ndarray, index: int) -> np.ndarray:
     """Mean and raw std before the tanh, [B, 2A], for observations [B, O]."""
-    rows = (raw - self._read(_MEAN, index)) / self._read(_STD, index)
+    rows = (raw - self._read(names.MEAN, index)) / self._read(names.STD, index)
     if self._scale:
       rows = np.concatenate([rows, np.tanh(raw / self._scale)], axis=-1)
     for name in self._hidden:
       rows = np.maximum(self._linear(name, rows, index), 0)
-    return self._linear(_OUTPUT, rows, index)
+    return self._linear(names.OUTPUT, rows, index)
 
   def _linear(self, name: str, rows: np.ndarray, index: int) -> np.ndarray:
     weight = self._read(f"{name}.weight", index)
-    if not name.startswith(_HEADS):  # torch's own layers are [outputs, inputs]
+    if not name.startswith(
+      names.HEADS
+    ):  # torch's own layers are [outputs, inputs]
       weight = weight.T
     return rows @ weight + self._read(f"{name}.bias", index)
 
   def _read(self, name: str, index: int = 0) -> np.ndarray:
     """An array, or a task's part of those that differ by task."""
     array = self._arrays[name]
-    return array[index] if name.startswith(_HEADS) else array
+    return array[index] if name.startswith(names.HEADS) else array
 
   def _index(self, task: str) -> int:
     if task not in self.tasks:
