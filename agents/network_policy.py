@@ -7,6 +7,7 @@ import numpy as np
 from lfgp_dmc.agents import serialisation
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.agents.policy_options import HEADS
 
 
 class NetworkPolicy(Policy):
@@ -25,6 +26,6 @@ class NetworkPolicy(Policy):
 
   def _read(self, name: str, index: int = 0) -> np.ndarray:
     tensor = self._tensors[name].detach()
-    if name.startswith("heads."):
+    if name.startswith(HEADS):
       tensor = tensor[index]
     return tensor.cpu().numpy()

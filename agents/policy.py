@@ -210,10 +210,8 @@ class Policy:
 
   def _linear(self, name: str, rows: np.ndarray, index: int) -> np.ndarray:
     weight = self._read(f"{name}.weight", index)
-    if not name.startswith(
-      names.HEADS
-    ):  # torch's own layers are [outputs, inputs]
-      weight = weight.T
+    if not name.startswith(names.HEADS):
+      weight = weight.T  # torch's own layers are [outputs, inputs]
     return rows @ weight + self._read(f"{name}.bias", index)
 
   def _read(self, name: str, index: int = 0) -> np.ndarray:

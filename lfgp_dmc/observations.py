@@ -100,7 +100,7 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   Raises:
     KeyError: a component is missing.
   """
-  if not has_state(observation) and any(map(_is_camera, observation)):
+  if not has_state(observation) and any(map(is_frame, observation)):
     return flatten_vision(observation)
   try:
     parts = [observation[name] for name in _BOUNDS]
@@ -120,11 +120,12 @@ def has_state(observation: Mapping[str, np.ndarray]) -> bool:
 def flatten_vision(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   """What the robot senses, then the pixels, float32 [18 + C H W 3]."""
   parts = [*map(observation.__getitem__, PROPRIOCEPTION)]
-  parts += [np.ravel(v) for k, v in observation.items() if _is_camera(k)]
+  parts += [np.ravel(v) for k, v in observation.items() if is_frame(k)]
   return np.concatenate(parts, dtype=np.float32)
 
 
-def _is_camera(name: str) -> bool:
+def is_frame(name: str) -> bool:
+  """Whether an observable of this name is a camera's frame."""
   return name.startswith(CAMERA_PREFIX)
 
 

@@ -4,7 +4,8 @@ Importing this loads no simulator; building an environment does.
 """
 
 import functools
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from lfgp_dmc import graphics
 from lfgp_dmc.task_names import CONTROL_RATES, check_task
@@ -67,18 +68,7 @@ def load(
   if unknown:
     valid = ", ".join(load.__kwdefaults__ or ())
     raise ValueError(f"unknown option {', '.join(unknown)}; valid: {valid}")
-  for name, choices in _CHOICES.items():
-    _check(name, given[name], choices)
-  if not 32 <= camera_size <= 480:
-    raise ValueError(f"camera_size is {camera_size!r}; valid: 32 to 480")
-  if observations != "features":
-    graphics.allow_pictures()
-    if fault := graphics.fault():
-      raise ValueError(fault)
-  if not time_limit * control_hz >= 1:
-    raise ValueError(
-      f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
-    )
+  _check(given)
   play = PlayTask(
     task,
     is_dense=reward == "dense",
@@ -93,8 +83,23 @@ def load(
   return environment
 
 
-def _check(name: str, value, valid) -> None:
-  if value not in valid:
+def _check(given: Mapping[str, Any]) -> None:
+  """Raises ValueError for the first option that is out of range."""
+  for name, valid in _CHOICES.items():
+    if given[name] not in valid:
+      raise ValueError(
+        f"unknown {name} {given[name]!r}; valid: {', '.join(map(str, valid))}"
+      )
+  if not 32 <= given["camera_size"] <= 480:
     raise ValueError(
-      f"unknown {name} {value!r}; valid: {', '.join(map(str, valid))}"
+      f"camera_size is {given['camera_size']!r}; valid: 32 to 480"
+    )
+  if given["observations"] != "features":
+    graphics.allow_pictures()
+    if fault := graphics.fault():
+      raise ValueError(fault)
+  time_limit, control_hz = given["time_limit"], given["control_hz"]
+  if not time_limit * control_hz >= 1:
+    raise ValueError(
+      f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
     )

@@ -103,13 +103,18 @@ class RunConfig:
       )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
-    for name in ("mirror_demonstrations", "shifted_copies"):
+    for name, why in (
+      ("mirror_demonstrations", "frames have no mirror image"),
+      ("shifted_copies", "frames cannot be shifted so"),
+    ):
       value = getattr(self, name)
+      valid = f"{name} is {value}; valid: {type(value)()} with"
       if self.environment and value:
         yield (
-          f"{name} is {value}; valid: {type(value)()} with environment (only "
-          "the block tasks' symmetries are known)"
+          f"{valid} environment (only the block tasks' symmetries are known)"
         )
+      if self.camera_size and value:
+        yield f"{valid} camera_size ({why})"
     if self.attempts_per_task and self.pairs_per_task:
       yield (
         f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
@@ -121,16 +126,6 @@ class RunConfig:
       yield (
         "collect_missing is True; valid: False without pairs_per_task or "
         "attempts_per_task"
-      )
-    if self.camera_size and self.mirror_demonstrations:
-      yield (
-        "mirror_demonstrations is True; valid: False with camera_size (frames "
-        "have no mirror image)"
-      )
-    if self.camera_size and self.shifted_copies:
-      yield (
-        f"shifted_copies is {self.shifted_copies}; valid: 0 with camera_size "
-        "(frames cannot be shifted so)"
       )
     if self.camera_size and self.transfer_from:
       yield (

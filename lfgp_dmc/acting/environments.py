@@ -48,7 +48,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
-  names += filter(_is_frame, spec)
+  names += filter(observations.is_frame, spec)
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -70,7 +70,7 @@ def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
   """
   spec: Any = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
-  found = [spec[name] for name in filter(_is_frame, names)]
+  found = [spec[name] for name in filter(observations.is_frame, names)]
   kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
   if not kinds:
     return ()
@@ -99,16 +99,24 @@ def with_unit_actions(environment: dm_env.Environment) -> dm_env.Environment:
   return _UnitActions(environment, spec)
 
 
-class _UnitActions:
-  """An environment whose actions are rescaled; all else is its own."""
+class _Wrapped:
+  """An environment of which some is another's; all else is its own."""
 
-  def __init__(self, environment: Any, spec: specs.BoundedArray):
-    self._environment, self._spec = environment, spec
+  def __init__(self, environment: Any):
+    self._environment = environment
 
   def __getattr__(self, name: str) -> Any:
     if name.startswith("__"):
       raise AttributeError(name)
     return getattr(self._environment, name)
+
+
+class _UnitActions(_Wrapped):
+  """Its actions are rescaled."""
+
+  def __init__(self, environment: Any, spec: specs.BoundedArray):
+    super().__init__(environment)
+    self._spec = spec
 
   def action_spec(self) -> specs.BoundedArray:
     """[A] in [-1, 1]."""
@@ -134,22 +142,22 @@ def with_features(
   return made
 
 
-class _Features:
-  """An environment whose frames are encoded; all else is its own."""
+class _Features(_Wrapped):
+  """Its frames are encoded."""
 
   def __init__(self, environment: Any, encode):
-    self._environment, self._encode = environment, encode
-
-  def __getattr__(self, name: str) -> Any:
-    if name.startswith("__"):
-      raise AttributeError(name)
-    return getattr(self._environment, name)
+    super().__init__(environment)
+    self._encode = encode
 
   def observation_spec(self) -> dict[str, specs.Array]:
     """The environment's own, without frames, with `features`."""
     spec = self._environment.observation_spec()
     frames = np.zeros((1, *frame_shape(self._environment)), np.uint8)
-    kept = {name: part for name, part in spec.items() if not _is_frame(name)}
+    kept = {
+      name: part
+      for name, part in spec.items()
+      if not observations.is_frame(name)
+    }
     shape = self._encode(frames)[0].shape
     return {**kept, _FEATURES: specs.Array(shape, np.float32, _FEATURES)}
 
@@ -163,16 +171,16 @@ class _Features:
 
   def _encoded(self, timestep: dm_env.TimeStep) -> dm_env.TimeStep:
     seen = timestep.observation
-    kept = {name: value for name, value in seen.items() if not _is_frame(name)}
+    kept = {
+      name: value
+      for name, value in seen.items()
+      if not observations.is_frame(name)
+    }
     frames = np.stack(
-      [value for name, value in seen.items() if _is_frame(name)]
+      [value for name, value in seen.items() if observations.is_frame(name)]
     )
     kept[_FEATURES] = self._encode(frames[None])[0]
     return timestep._replace(observation=kept)
-
-
-def _is_frame(name: str) -> bool:
-  return name.startswith(observations.CAMERA_PREFIX)
 
 
 def reseeded(

@@ -44,12 +44,7 @@ def ordered(
     LostWorkerError: a process was killed. What a job raises is raised as it is.
   """
   if workers == 1:
-    state = make_state()
-    try:
-      yield from map(state, jobs)
-    finally:
-      if hasattr(state, "close"):
-        state.close()
+    yield from _in_this_process(make_state, jobs)
     return
   if draws:
     graphics.allow_pictures()
@@ -84,6 +79,17 @@ def ordered(
       for worker in crew:
         worker.kill()
       waiting.shutdown(cancel_futures=True)
+
+
+def _in_this_process(
+  make_state: MakeState, jobs: Iterable[Any]
+) -> Generator[Any, None, None]:
+  state = make_state()
+  try:
+    yield from map(state, jobs)
+  finally:
+    if hasattr(state, "close"):
+      state.close()
 
 
 class _Worker:

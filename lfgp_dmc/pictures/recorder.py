@@ -9,7 +9,7 @@ import dm_env
 import numpy as np
 
 from lfgp_dmc.acting import environments, rollout
-from lfgp_dmc.observations import CAMERA_PREFIX, SUCCESS_PREFIX
+from lfgp_dmc.observations import SUCCESS_PREFIX, is_frame
 from lfgp_dmc.pictures import video
 from lfgp_dmc.types import Actor
 
@@ -167,8 +167,7 @@ class _Recorder:
   def _with_insets(self, frame: np.ndarray) -> np.ndarray:
     """What the actor's cameras saw last, along the lower edge."""
     seen = self.timestep.observation
-    names = [name for name in seen if name.startswith(CAMERA_PREFIX)]
-    return video.inset(frame, [seen[name] for name in names])
+    return video.inset(frame, [seen[name] for name in filter(is_frame, seen)])
 
   def _captioned(self, frame: np.ndarray) -> np.ndarray:
     main_task = self._look.scheduled_for

@@ -107,6 +107,15 @@ class ChooseBackendTest(parameterized.TestCase):
 
 
 class FirstImportTest(parameterized.TestCase):
+  def _run(self, code):
+    """In a new process, whose environment says nothing of graphics."""
+    names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
+    clean = {k: v for k, v in os.environ.items() if k not in names}
+    done = subprocess.run(
+      [sys.executable, "-c", code], env=clean, capture_output=True, text=True
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+
   @parameterized.parameters(
     "import mujoco, OpenGL.GL",
     "from dm_control import mujoco",
@@ -126,12 +135,7 @@ class FirstImportTest(parameterized.TestCase):
         "env = gymnasium.make('lfgp_dmc/Reach-v0', render_mode='rgb_array')\n"
         "env.reset()\nassert env.render().std() > 0\n"
       )
-    names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
-    clean = {k: v for k, v in os.environ.items() if k not in names}
-    done = subprocess.run(
-      [sys.executable, "-c", code], env=clean, capture_output=True, text=True
-    )
-    self.assertEqual(done.returncode, 0, done.stderr)
+    self._run(code)
 
   @mock.patch.dict(os.environ, MUJOCO_GL="off")
   @mock.patch.object(graphics, "choose_backend", lambda: "off")
@@ -150,12 +154,7 @@ class FirstImportTest(parameterized.TestCase):
       "env = lfgp_dmc.load('reach', 0, observations='vision')\n"
       "assert env.reset().observation['camera/wrist'].std() > 0\n"
     )
-    names = ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY", "WAYLAND_DISPLAY")
-    clean = {k: v for k, v in os.environ.items() if k not in names}
-    done = subprocess.run(
-      [sys.executable, "-c", code], env=clean, capture_output=True, text=True
-    )
-    self.assertEqual(done.returncode, 0, done.stderr)
+    self._run(code)
 
 
 class SetUpGraphicsTest(absltest.TestCase):
