@@ -26,21 +26,23 @@ def tanh_layer(
 ) -> torch.Tensor:
   """tanh(inputs weight^T + bias), without a gradient.
 
-  In one operation where there is one, which rounds once and, in bfloat16, takes
-  less than half the time.
+  In float32 as 2 sigmoid(2 x) - 1: some CPUs' tanh takes five times as long. In
+  bfloat16 in one operation, if the CPU has one, which rounds once.
   """
-  if _is_fused(inputs.device.type, inputs.dtype):
+  if inputs.dtype == torch.float32:
+    double = torch.addmm(bias, inputs, weight.t(), beta=2, alpha=2)
+    return double.sigmoid_().mul_(2).sub_(1)
+  if inputs.is_cpu and _has_bfloat16():
     own = torch.ops.mkldnn
     return own._linear_pointwise(inputs, weight, bias, "tanh", [], "")
   return torch.addmm(bias, inputs, weight.t()).tanh_()
 
 
 @functools.cache
-def _is_fused(device: str, dtype: torch.dtype) -> bool:
-  if device != "cpu" or not torch.backends.mkldnn.is_available():
+def _has_bfloat16() -> bool:
+  if not torch.backends.mkldnn.is_available():
     return False
-  is_wide = dtype == torch.float32
-  return is_wide or torch.ops.mkldnn._is_mkldnn_bf16_supported()
+  return torch.ops.mkldnn._is_mkldnn_bf16_supported()
 
 
 class DiscriminatorPasses(torch.autograd.Function):
