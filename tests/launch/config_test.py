@@ -108,7 +108,7 @@ class ConfigTest(parameterized.TestCase):
       "--config.agent.scheduler.xi",
     ),
     ("--config.nothing_like_it=1", "unknown --config.nothing_like_it"),
-    ("--preset=quick", "unknown preset 'quick'; valid: paper, ral, fast"),
+    ("--preset=quick", "unknown preset 'quick'; valid: paper, ral, vpace"),
     ("--config.algorithm=dqn", "unknown algorithm 'dqn'; valid: lfgp"),
     ("--config.main_task=juggle", "config.main_task is 'juggle'; valid: stack"),
     (
