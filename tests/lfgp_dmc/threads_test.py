@@ -19,7 +19,7 @@ command.run(lambda: print(os.environ.get("OMP_WAIT_POLICY"), *sys.modules))
 _ALLOCATIONS = """
 import resource
 from lfgp_dmc import threads
-threads.keep_freed_memory()
+threads.keep_memory()
 def faults():
   blocks = [bytearray(1 << 22) for _ in range(16)]
   del blocks
