@@ -154,6 +154,7 @@ def make_agent(
     parts.device,
     *parts.widths,
     bfloat16=config.bfloat16,
+    threads=config.threads or command.cores(),
     cuda_graphs=config.cuda_graphs,
     frame_shape=parts.frame_shape,
     encoder=parts.encoder,

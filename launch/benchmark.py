@@ -1,6 +1,7 @@
 """Measures this machine; prints name=value lines.
 
 python launch/benchmark.py --what=bars --output=bars.csv
+python launch/benchmark.py --what=presets --seconds=2 --output=presets.csv
 python launch/benchmark.py --what=environment
 python launch/benchmark.py --what=learner --preset=fast
 python launch/benchmark.py --what=training --preset=fast
@@ -27,8 +28,9 @@ from lfgp_dmc.launch.command import UserError
 _COLUMNS = ("name", "value", "bar")  # the last of bars alone
 _DEFAULT_STEPS = {
   "bars": 900,
+  "presets": 0,  # they are timed instead, as is a learner
   "environment": 7_200,
-  "learner": 0,  # it is timed instead
+  "learner": 0,
   "training": 900,
   "acting": 50,
   "memory": 20_000,
@@ -40,7 +42,7 @@ _WHAT = flags.DEFINE_enum(
   "environment",
   list(_DEFAULT_STEPS),
   "bars: what the presets' users wait for, beside what it should be, in five "
-  "minutes of an idle machine. "
+  "minutes of an idle machine. presets: the learner of each. "
   "environment: control steps a second through dm_env, the physics' alone, a "
   "reset's time. learner: updates a second, against "
   "matrix products. training: the whole loop, against the learner alone, and "
@@ -106,6 +108,7 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple]:
   steps = _STEPS.value or _DEFAULT_STEPS[what]
   arguments: dict[str, tuple] = {
     "bars": (steps, seconds),
+    "presets": (seconds,),
     "environment": (steps, seed),
     "learner": (config, seconds),
     "training": (config, steps, seconds),

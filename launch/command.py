@@ -43,6 +43,7 @@ def run(
   """
   signals.catch()
   threads.wait_passively()
+  threads.keep_memory()
   for stream in (sys.stdout, sys.stderr):  # of any encoding
     if isinstance(stream, io.TextIOWrapper):
       stream.reconfigure(errors="backslashreplace")

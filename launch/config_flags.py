@@ -67,6 +67,15 @@ def resolved(
   return configs.from_dict(flag_values.config.to_dict())
 
 
+def config_of(*arguments: str) -> configs.RunConfig:
+  """What a command with these arguments gets."""
+  values = flags.FlagValues()
+  expanded = values.read_flags_from_files(list(arguments))
+  define(expanded, values)
+  values(["command", *expanded])
+  return resolved(values)
+
+
 def resumed(stored: Mapping[str, Any]) -> configs.RunConfig:
   """A run's config with the given settings over it.
 

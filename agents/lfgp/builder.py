@@ -24,6 +24,7 @@ from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, Training, make_networks
 from lfgp_dmc.agents.lfgp.pretraining import Pretraining
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
+from lfgp_dmc.agents.lfgp.second_thread import SecondThread
 from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.schedulers import make_scheduler
@@ -42,6 +43,7 @@ def build(
   action_size: int,
   *,
   bfloat16: bool = False,
+  threads: int = 1,
   cuda_graphs: bool = True,
   encoder: Encoder | None = None,
   **unused: object,
@@ -49,9 +51,10 @@ def build(
   """Builds an LfGP agent; all its random numbers follow from the seed.
 
   The replay is filled by the training loop. With `bfloat16`, parameters stay
-  float32; with `cuda_graphs`, a GPU records updates, then replays them. From
-  pixels, the frozen `encoder` has made the features of all observations, and is
-  stored with the intentions.
+  float32; of two CPU `threads`, one trains discriminators, if there are any;
+  with `cuda_graphs`, a GPU records updates, then replays them. From pixels, the
+  frozen `encoder` has made the features of all observations, and is stored with
+  the intentions.
 
   Raises:
     ValueError: demonstrations, stored rewards or scheduler do not fit.
@@ -73,7 +76,9 @@ def build(
   )
   noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
   columns = replay.reward_columns(tasks) if config.keeps_rewards else []
-  learner = make_learner(config, networks, noise, dtype, columns, cuda_graphs)
+  learner = make_learner(
+    config, networks, noise, dtype, columns, threads, cuda_graphs
+  )
   batches = BatchMaker(
     config, replay, columns, experts, standardiser, random("sampling")
   )
@@ -95,6 +100,7 @@ def make_learner(
   generator: torch.Generator,
   dtype: torch.dtype = torch.float32,
   stored_columns: Sequence[int] = (),
+  threads: int = 1,
   cuda_graphs: bool = False,
 ) -> LfgpLearner:
   """Builds what trains the networks; noise is from `generator`.
@@ -103,12 +109,18 @@ def make_learner(
   used; products are of the dtype.
   """
   networks.flatten(dtype)
-  is_recorded = cuda_graphs and generator.device.type == "cuda"
+  on_gpu = generator.device.type == "cuda"
+  second = None
+  if threads > 1 and isinstance(config.reward, DiscriminatorReward):
+    second = None if on_gpu else SecondThread(threads)
   prior = None
   if networks.prior is not None:
     prior = Prior(config.prior, networks.prior, generator.device)
   shared = Training(networks, config.optimiser, generator, dtype)
-  reward = _make_reward(config, shared, stored_columns)
+  of_reward = shared
+  if second is not None:
+    of_reward = shared._replace(generator=second.generator)
+  reward = _make_reward(config, of_reward, stored_columns)
   return LfgpLearner(
     networks,
     reward,
@@ -117,7 +129,8 @@ def make_learner(
     prior,
     generator,
     config.critic.warmup_updates,
-    CudaRecorder(generator) if is_recorded else None,
+    CudaRecorder(generator) if on_gpu and cuda_graphs else None,
+    second,
   )
 
 

@@ -1,5 +1,7 @@
 """The critics' part of an update: soft Bellman residuals, bounds on values."""
 
+from collections.abc import Callable
+
 import torch
 
 from lfgp_dmc.agents.lfgp.config import CriticConfig
@@ -43,11 +45,23 @@ class CriticLearner:
       temperature.device,
     )
 
-  def update(self, batch: LabelledBatch) -> Metrics:
-    """One update of trunk and critics; metrics of losses and values."""
+  def update(
+    self,
+    batch: LabelledBatch,
+    following: Callable[[], tuple[torch.Tensor, torch.Tensor]],
+  ) -> Metrics:
+    """One update of trunk and critics; metrics of losses and values.
+
+    `following` gives what the method of its name returns.
+    """
     config, reward = self._config, batch.reward
-    target = self._target(batch)
     q = self._networks.critics(batch.inputs.to(self._dtype), batch.action)
+    target = soft_bellman_target(
+      reward,
+      *following(),
+      self._networks.log_temperature.detach().exp(),
+      config.discount,
+    )
     loss, metrics = critic_loss(q, target, batch.mask)
     if config.value_penalty > 0:
       low, high = self.bounds(reward, q[0].detach())
@@ -69,16 +83,15 @@ class CriticLearner:
     target.follow(self._flat, self._config.polyak)
 
   @torch.no_grad()
-  def _target(self, batch: LabelledBatch) -> torch.Tensor:
-    """The soft Bellman targets, [K, B]."""
+  def following(
+    self, next_inputs: torch.Tensor
+  ) -> tuple[torch.Tensor, torch.Tensor]:
+    """The target critics' values [2, K, B] of fresh actions at [B, O].
+
+    And the actions' log densities [K, B].
+    """
     networks = self._networks
-    next_inputs = batch.next_inputs.to(self._dtype)
+    next_inputs = next_inputs.to(self._dtype)
     mean, std = networks.intentions(next_inputs)
     action, log_prob = tanh_gaussian.draw(mean, std, self._generator)
-    return soft_bellman_target(
-      batch.reward,
-      networks.target_critics(next_inputs, action),
-      log_prob,
-      networks.log_temperature.exp(),
-      self._config.discount,
-    )
+    return networks.target_critics(next_inputs, action), log_prob

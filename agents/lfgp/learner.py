@@ -15,6 +15,7 @@ from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks
 from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
+from lfgp_dmc.agents.lfgp.second_thread import SecondThread, at_once
 from lfgp_dmc.agents.losses import Metrics
 
 
@@ -31,8 +32,12 @@ class LfgpLearner:
     generator: torch.Generator,
     warmup_updates: int = 0,
     recorder: CudaRecorder | None = None,
+    second: SecondThread | None = None,
   ):
-    """With a recorder, updates are recorded, then replayed."""
+    """With a recorder, updates are recorded, then replayed.
+
+    With a second thread, discriminators learn beside the rest of an update.
+    """
     self.networks = networks
     self.reward = reward
     self.critics = critics
@@ -42,6 +47,7 @@ class LfgpLearner:
     self._generator = generator
     self._warmup_updates = warmup_updates
     self._recorded = RecordedUpdates(recorder) if recorder else None
+    self._second = second
     self._optimisers = {
       "critic": critics.optimiser,
       **intentions.optimisers,
@@ -67,16 +73,27 @@ class LfgpLearner:
 
   def _update(self, trains_intentions: bool, draw: Draw) -> Metrics:
     """One update; it may be recorded, so only tensors change between two."""
-    metrics = self.reward.update(draw)
-    batch = self.reward.label(draw.batch)
-    metrics |= self.critics.update(batch)
+    if self._second is not None:
+      # Rewards are by the discriminators before their step, not after.
+      self._second.seed_noise(self._generator)
+      start = self._second.start
+      following = start(self.critics.following, draw.batch.next_inputs)
+      batch = self.reward.label(draw.batch)
+      trained = start(self.reward.update, draw)
+    else:
+      start = at_once
+      trained = start(self.reward.update, draw)
+      batch = self.reward.label(draw.batch)
+      following = functools.partial(self.critics.following, batch.next_inputs)
+    metrics = self.critics.update(batch, following)
+    followed = start(self.critics.update_targets)
     if trains_intentions:
       states = batch.inputs[: batch.policy_rows]
       if draw.replayed is not None:
         states = draw.replayed.inputs
       metrics |= self.intentions.update(states)
-    self.critics.update_targets()
-    return metrics
+    followed()
+    return metrics | trained()
 
   def state_dict(self) -> dict[str, Any]:
     """Networks, optimisers, noise and the count of updates."""

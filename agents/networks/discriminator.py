@@ -6,7 +6,7 @@ import torch
 
 from lfgp_dmc.agents.networks.discriminator_passes import (
   DiscriminatorPasses,
-  tanh_,
+  tanh_layer,
 )
 from lfgp_dmc.agents.networks.flat import FlatModule, in_products
 from lfgp_dmc.agents.networks.linear import make_linear
@@ -53,8 +53,11 @@ class Discriminator(FlatModule):
   @torch.no_grad()
   def logits(self, pairs: torch.Tensor) -> torch.Tensor:
     """Of pairs [..., I] (see `join`), float32 [..., K], without gradient."""
-    hidden = tanh_(self.first(pairs))
-    return self.output(tanh_(self.second(hidden))).float()
+    hidden = pairs
+    for layer in (self.first, self.second):
+      parts = (layer.weight, layer.bias)
+      hidden = tanh_layer(hidden, *(in_products(p, pairs.dtype) for p in parts))
+    return self.output(hidden).float()
 
   def logits_and_gradient(
     self, pairs: torch.Tensor, mixed: torch.Tensor, per_task: bool = False

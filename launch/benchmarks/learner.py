@@ -25,7 +25,9 @@ _ROUNDS = 5  # of updates and products in turns: a shared host's speed wanders
 _DTYPES = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 
-def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
+def measure(
+  config: RunConfig, seconds: float, is_profiled: bool = True
+) -> Iterator[tuple[str, float]]:
   """Measures updates and matrix products, in fp32 and bf16, 1 and 2 threads.
 
   Each measurement takes about `seconds`.
@@ -34,21 +36,25 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
     `gflop/<term>` and their sum `gflop_per_update` (see `_gflop_of_update`);
     `updates_per_s_fp32_1thread` and so on, medians over rounds;
     `matmul_gflops_...`; `roofline_fraction_...`: the first times the second
-    over the third, median of the rounds' own; `products_gflops_...` and
-    `products_fraction_...`: the same against the products that an update really
-    makes, alone; `share_<part>_...`: of one thread's time (see `profiling`).
+    over the third, median of the rounds' own. If profiled, of one thread:
+    `products_gflops_...` and `products_fraction_...`, the same against the
+    products that an update really makes, alone; `share_<part>_...` of its time
+    (see `profiling`).
   """
   for name, value in _gflop_of_update(config).items():
     yield f"gflop/{name}", value
   operations = operations_of_update(config)
   yield "gflop_per_update", operations / 1e9
   for threads in (1, 2):
-    torch.set_num_threads(threads)
     for name, dtype in _DTYPES.items():
       suffix = f"{name}_{threads}thread{'s' if threads > 1 else ''}"
-      agent = make_agent(dataclasses.replace(config, bfloat16=name == "bf16"))
+      own = dataclasses.replace(config, bfloat16=name == "bf16")
+      agent = make_agent(own, threads=threads)
       rounds = [
-        (rate(agent.update, seconds / _ROUNDS), best_matmul_rate(dtype))
+        (
+          rate(agent.update, seconds / _ROUNDS),
+          best_matmul_rate(dtype, threads),
+        )
         for _ in range(_ROUNDS)
       ]
       rates, peaks = zip(*rounds, strict=True)
@@ -58,13 +64,11 @@ def measure(config: RunConfig, seconds: float) -> Iterator[tuple[str, float]]:
         f"roofline_fraction_{suffix}",
         statistics.median(r * operations / p for r, p in rounds),
       )
-      own = profiling.product_rate(agent)
-      yield f"products_gflops_{suffix}", own / 1e9
-      yield (
-        f"products_fraction_{suffix}",
-        statistics.median(rates) * operations / own,
-      )
-      if threads == 1:
+      if is_profiled and threads == 1:
+        products = profiling.product_rate(agent)
+        yield f"products_gflops_{suffix}", products / 1e9
+        fraction = statistics.median(rates) * operations / products
+        yield f"products_fraction_{suffix}", fraction
         for part, share in profiling.time_shares(agent).items():
           yield f"share_{part}_{suffix}", share
 
@@ -117,11 +121,14 @@ def _gflop_of_update(run: RunConfig) -> dict[str, float]:
   return terms
 
 
-def best_matmul_rate(dtype: torch.dtype) -> float:
+def best_matmul_rate(dtype: torch.dtype, threads: int) -> float:
   """Operations a second of batched products as large as the critics'."""
   left, right = (torch.randn(_PRODUCTS).to(dtype) for _ in range(2))
   out = torch.empty(_PRODUCTS, dtype=dtype)
+  before = torch.get_num_threads()
+  torch.set_num_threads(threads)
   best = profiling.best_time(lambda: torch.bmm(left, right, out=out))
+  torch.set_num_threads(before)
   groups, rows, inner = _PRODUCTS
   return 2 * groups * rows * inner * inner / best
 
@@ -133,14 +140,17 @@ def tasks_of(config: RunConfig) -> tuple[str, ...]:
   return (config.main_task,)
 
 
-def make_agent(config: RunConfig, replay: Replay | None = None):
+def make_agent(
+  config: RunConfig, replay: Replay | None = None, threads: int = 1
+):
   """The config's agent; data that lack are made up.
 
-  Without pretraining and the critics' head start.
+  Without pretraining and the critics' head start. Sets torch's threads.
   """
   tasks = tasks_of(config)
   assert isinstance(config.agent, LfgpConfig), "of LfGP and its variants"
   size = observations.OBSERVATION_SIZE
+  torch.set_num_threads(threads)
   if replay is None:
     rows = synthetic.transitions(_ROWS, size, _ACTION_SIZE)
     rewards = np.zeros((_ROWS, len(tasks)), np.float32)  # for SAC-X
@@ -159,6 +169,7 @@ def make_agent(config: RunConfig, replay: Replay | None = None):
     size,
     _ACTION_SIZE,
     bfloat16=config.bfloat16,
+    threads=threads,
   )
 
 

@@ -5,7 +5,6 @@ import tempfile
 from collections.abc import Iterator
 
 import numpy as np
-import torch
 
 from lfgp_dmc import observations, progress_bars
 from lfgp_dmc.agents import synthetic
@@ -27,7 +26,6 @@ def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
     memory, mapped pages counted (Linux: VmRSS), before the first update and
     after every tenth part of them; `resident_gb`: the most of these.
   """
-  torch.set_num_threads(config.threads or 1)
   _ASIDE.mkdir(exist_ok=True)
   with tempfile.TemporaryDirectory(dir=_ASIDE) as folder:
     replay = Replay(
@@ -38,7 +36,7 @@ def measure(config: RunConfig, updates: int) -> Iterator[tuple[str, float]]:
     )
     _fill(replay)
     yield "replay_rows", len(replay)
-    agent = learner.make_agent(config, replay)
+    agent = learner.make_agent(config, replay, config.threads or 1)
     readings = [resident_gb()]
     yield "resident_gb/0", readings[0]
     part = max(1, updates // _READINGS)

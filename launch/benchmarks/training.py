@@ -36,12 +36,12 @@ def measure(
     `loop_fraction_...`; `loop_updates_per_s_..._beside_busy`;
     `second_thread_gain` and `..._beside_busy`, the loop's ratio of two to one.
   """
-  run = _Run(config, steps)
+  runs = {threads: _Run(config, steps, threads) for threads in (1, 2)}
   found = collections.defaultdict(list)
   for _ in range(_ROUNDS):
     row = {}
-    for threads in (1, 2):
-      torch.set_num_threads(threads)
+    for threads, run in runs.items():
+      torch.set_num_threads(run.threads_of_torch)
       suffix = f"{threads}thread{'s'[: threads - 1]}"
       alone = learner.rate(run.agent.update, seconds / _ROUNDS)
       row[f"learner_updates_per_s_{suffix}"] = alone
@@ -65,14 +65,15 @@ def measure(
 class _Run:
   """A run that goes on each time."""
 
-  def __init__(self, config: RunConfig, steps: int):
+  def __init__(self, config: RunConfig, steps: int, threads: int):
     """Fills the replay with what the first update needs."""
     self._config, self._progress = config, Progress()
     first = config.agent.batch_size
     self._replay = Replay(
       4 * steps + first, observations.OBSERVATION_SIZE, _ACTION_SIZE
     )
-    self.agent = learner.make_agent(config, self._replay)
+    self.agent = learner.make_agent(config, self._replay, threads)
+    self.threads_of_torch = torch.get_num_threads()  # a second may share them
     self._environment = config.environment_spec.build(seed=config.seed)
     self._train(first, warmup_steps=first + 1)
 

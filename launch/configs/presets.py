@@ -25,9 +25,9 @@ _RAL: dict[str, Any] = {
   "agent.scheduler.kind": "weighted_random_handcrafted",
 }
 
-# The authors' latest version: no discriminator, but +1 for a task's own examples
-# of success and -1 for all else, scaled, with the value penalty. Its data, 200
-# final states a task: see launch/flags/examples.flags.
+# The authors' latest version: no discriminator, but +1 for a task's own
+# examples of success and -1 for all else, scaled, with the value penalty. Its
+# data, 200 final states a task: see launch/flags/examples.flags.
 _VPACE: dict[str, Any] = {
   "control_hz": 5,
   "env_steps": 500_000,

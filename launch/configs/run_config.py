@@ -78,8 +78,8 @@ class RunConfig:
   # Resources.
   replay_capacity: PositiveInt = 4_000_000  # transitions
   device: Text = "auto"  # cpu, cuda, ...; auto: cuda where there is one
-  # Of torch; 0: one a core that this process may use. More than one pays on an
-  # idle machine alone, and there with OMP_WAIT_POLICY=ACTIVE.
+  # 0: one a core that this process may use. Of two, one trains discriminators
+  # while the other trains critics and intentions.
   threads: Processes = 1
   bfloat16: Switch = False  # products in bfloat16; parameters stay float32
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed

@@ -65,6 +65,7 @@ def make_agent(
   replay=None,
   sizes: tuple[int, int] = (OBS, A),
   bfloat16: bool = False,
+  threads: int = 1,
   **fields: Any,
 ):
   """A small LfGP agent on made-up data; `fields`: of `config`."""
@@ -74,7 +75,7 @@ def make_agent(
     replay = synthetic.replay(synthetic.transitions(200, *sizes))
   settings = config(**fields)
   fixed = (tasks, shown, replay, seed, "cpu", *sizes)
-  return lfgp.build(settings, *fixed, bfloat16=bfloat16)
+  return lfgp.build(settings, *fixed, bfloat16=bfloat16, threads=threads)
 
 
 def make_learner(*args: Any, **fields: Any):

@@ -80,6 +80,15 @@ class UpdateTest(parameterized.TestCase):
     torch.testing.assert_close(metrics["reward"], after)
     self.assertGreater((before - after).abs().max().item(), 1e-3)
 
+  def test_beside_a_second_thread_rewards_come_from_before_its_step(self):
+    learner = make_learner(threads=2, **{"reward.learning_rate": 0.1})
+    draw = _draw()
+    before = learner.reward.label(draw.batch).reward.mean(1)
+    metrics = learner.update(draw)
+    after = learner.reward.label(draw.batch).reward.mean(1)
+    torch.testing.assert_close(metrics["reward"], before)
+    self.assertGreater((before - after).abs().max().item(), 1e-3)
+
   @parameterized.parameters(
     {"critic.value_penalty": 10.0},
     {"inputs.standardise": True, "reward.noise": 0.3},

@@ -204,6 +204,7 @@ class DeterminismTest(parameterized.TestCase):
     {"prior.weight": 1.0, "prior.decay": 0.9},
     {"reward.main_masked": "0:2"},
     {"networks.layout": "separate", "critic.value_penalty": 10.0},
+    {"threads": 2},
   )
   def test_resumed_agent_goes_on_bit_for_bit(self, **fields):
     fields |= {**_PERIODS, "networks.actor_trunk": "own"}

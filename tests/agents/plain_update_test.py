@@ -65,8 +65,8 @@ class Plain:
     hidden = torch.tanh(_linear(pairs, n.first))
     return _linear(torch.tanh(_linear(hidden, n.second)), n.output)
 
-  def discriminator_loss(self, policy, expert):
-    share = torch.rand((K, N, policy.shape[1]), generator=self.noise)
+  def discriminator_loss(self, policy, expert, noise):
+    share = torch.rand((K, N, policy.shape[1]), generator=noise)
     loss, norms = 0.0, []
     for k in range(K):
       for sign, pairs in ((1, policy), (-1, expert[k])):
@@ -152,6 +152,7 @@ class PlainUpdateTest(parameterized.TestCase):
     {},
     {"networks.layout": "separate"},
     {"networks.actor_trunk": "own", "networks.critic_layer_norm": True},
+    {"threads": 2},
   )
   def test_losses_and_gradients_equal_the_equations(self, **fields):
     learner = _learner(**fields)
@@ -173,9 +174,13 @@ class PlainUpdateTest(parameterized.TestCase):
       "policy": list(policy.parameters()),
       "temperature": [networks.log_temperature],
     }
+    other_noise = noise
+    if "threads" in fields:  # the second has noise of its own
+      seed = int(torch.randint(2**62, (), generator=noise))
+      other_noise = torch.Generator().manual_seed(seed)
     # In the order in which the update draws its noise.
     losses = [
-      plain.discriminator_loss(policy_pairs, expert_pairs),
+      plain.discriminator_loss(policy_pairs, expert_pairs, other_noise),
       plain.critic_loss(batch),
       *plain.intention_losses(batch.inputs),
     ]

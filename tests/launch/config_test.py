@@ -8,6 +8,7 @@ from absl.testing import parameterized
 
 from lfgp_dmc import task_names
 from lfgp_dmc.launch import config_flags, configs
+from lfgp_dmc.launch.config_flags import config_of
 
 _FLAGS = pathlib.Path(config_flags.__file__).parent / "flags"
 # Of runs: not the sweep, whose flags are launch/sweep.py's.
@@ -18,18 +19,9 @@ _FLAGFILES = sorted(
 )
 
 
-def resolve(*arguments: str) -> configs.RunConfig:
-  """What a command with these arguments gets."""
-  values = flags.FlagValues()
-  expanded = flags.FLAGS.read_flags_from_files(list(arguments))
-  config_flags.define(expanded, values)
-  values(["command", *expanded])
-  return config_flags.resolved(values)
-
-
 class ConfigTest(parameterized.TestCase):
   def test_defaults_are_the_dataclasses_own(self):
-    config = resolve()
+    config = config_of()
     self.assertEqual(config, configs.RunConfig())
     self.assertEqual(config.env_steps, 4_000_000)
     self.assertEqual(config.evaluate_every, 100_000)
@@ -37,10 +29,10 @@ class ConfigTest(parameterized.TestCase):
     self.assertEqual(config.evaluation_episodes, 50)
     self.assertEqual((config.warm_up, config.random_steps), (1000, 1000))
     self.assertEqual(config.most_episode_steps, 360)
-    self.assertEqual(resolve("--preset=fast").most_episode_steps, 90)
+    self.assertEqual(config_of("--preset=fast").most_episode_steps, 90)
 
   def test_flags_override_the_preset_wherever_they_stand(self):
-    config = resolve(
+    config = config_of(
       "--config.agent.critic.polyak=0.5", "--preset=ral", "--config.seed=3"
     )
     self.assertEqual(config.agent.critic.polyak, 0.5)
@@ -51,7 +43,7 @@ class ConfigTest(parameterized.TestCase):
     preset=list(configs.PRESETS), algorithm=list(configs.ALGORITHMS)
   )
   def test_every_preset_fits_every_algorithm(self, preset, algorithm):
-    config = resolve(f"--config.algorithm={algorithm}", f"--preset={preset}")
+    config = config_of(f"--config.algorithm={algorithm}", f"--preset={preset}")
     self.assertEqual(config.algorithm, algorithm)
     values = dict(configs.flattened(config.to_dict()))
     chosen, of_preset = configs.ALGORITHMS[algorithm], configs.PRESETS[preset]
@@ -81,7 +73,7 @@ class ConfigTest(parameterized.TestCase):
 
   @parameterized.parameters(*configs.ALGORITHMS)
   def test_comes_back_from_its_json_form(self, algorithm):
-    config = resolve(
+    config = config_of(
       "--preset=fast", "--config.main_task=bring",
       f"--config.algorithm={algorithm}",
     )  # fmt: skip
@@ -89,7 +81,7 @@ class ConfigTest(parameterized.TestCase):
     self.assertEqual(configs.from_dict(values), config)
 
   def test_a_kind_chooses_the_fields_of_its_group(self):
-    config = resolve(
+    config = config_of(
       "--preset=fast_precise",
       "--config.agent.scheduler.kind=q_table",
       "--config.agent.scheduler.phi=0.5",
@@ -98,11 +90,11 @@ class ConfigTest(parameterized.TestCase):
     self.assertEqual((config.agent.scheduler.phi, config.agent.scheduler.xi),
                      (0.5, 45))  # fmt: skip
     with self.assertRaisesRegex(ValueError, "unknown --config.agent.sched"):
-      resolve("--config.agent.scheduler.main_weight=0.5")
+      config_of("--config.agent.scheduler.main_weight=0.5")
 
   def test_insert_is_more_precise(self):
     bring, insert = (
-      resolve("--preset=fast_precise", f"--config.main_task={task}")
+      config_of("--preset=fast_precise", f"--config.main_task={task}")
       for task in ("bring", "insert")
     )
     self.assertEqual((bring.bfloat16, insert.bfloat16), (True, False))
@@ -150,27 +142,27 @@ class ConfigTest(parameterized.TestCase):
   )
   def test_bad_values_are_refused(self, arguments, message):
     with self.assertRaises(ValueError) as caught:
-      resolve(*arguments.split())
+      config_of(*arguments.split())
     self.assertIn(message, str(caught.exception))
 
   def test_only_the_block_tasks_have_symmetries(self):
     images = "--config.mirror_demonstrations"
-    self.assertTrue(resolve(images).mirror_demonstrations)
+    self.assertTrue(config_of(images).mirror_demonstrations)
     for symmetry in (images, "--config.shifted_copies=1"):
       with self.assertRaisesRegex(
         ValueError, "is (True; valid: False|1; valid: 0) with environment"
       ):
-        resolve(symmetry, "--config.environment=package.module:factory")
+        config_of(symmetry, "--config.environment=package.module:factory")
 
   def test_pairs_and_attempts_are_not_both_counted(self):
     with self.assertRaisesRegex(ValueError, "collect_missing is True"):
-      resolve("--config.collect_missing")
+      config_of("--config.collect_missing")
     with self.assertRaisesRegex(ValueError, "attempts_per_task is 5; valid: 0"):
-      resolve("--config.attempts_per_task=5", "--config.pairs_per_task=9")
+      config_of("--config.attempts_per_task=5", "--config.pairs_per_task=9")
 
   def test_a_value_of_another_type_is_a_flag_error(self):
     with self.assertRaises(flags.IllegalFlagValueError):
-      resolve("--config.seed=many")
+      config_of("--config.seed=many")
 
   def test_unknown_stored_fields_are_named(self):
     values = configs.RunConfig().to_dict()
@@ -181,7 +173,7 @@ class ConfigTest(parameterized.TestCase):
       configs.from_dict(values)
 
   def test_a_run_older_than_a_field_has_its_default(self):
-    config = resolve("--config.algorithm=dac", "--config.seed=3")
+    config = config_of("--config.algorithm=dac", "--config.seed=3")
     values = config.to_dict()
     del values["control_hz"], values["agent"]["networks"]["layout"]
     del values["agent"]["critic"]
@@ -189,7 +181,7 @@ class ConfigTest(parameterized.TestCase):
 
   @parameterized.parameters(*configs.PRESETS)
   def test_no_preset_makes_sacx_need_demonstrations(self, preset):
-    config = resolve("--config.algorithm=sacx", f"--preset={preset}")
+    config = config_of("--config.algorithm=sacx", f"--preset={preset}")
     self.assertFalse(config.agent.uses_demonstrations)
     self.assertTrue(config.agent.keeps_rewards)
 
@@ -198,7 +190,7 @@ class FlagfilesTest(parameterized.TestCase):
   @parameterized.parameters(*_FLAGFILES)
   def test_resolves_for_every_main_task(self, name):
     for task in task_names.MAIN_TASKS:
-      config = resolve(
+      config = config_of(
         f"--flagfile={_FLAGS / name}", f"--config.main_task={task}"
       )
       self.assertEqual(
@@ -209,7 +201,7 @@ class FlagfilesTest(parameterized.TestCase):
 
   def test_there_is_one_for_each_algorithm_and_few_others(self):
     for algorithm in configs.ALGORITHMS:
-      config = resolve(f"--flagfile={_FLAGS / algorithm}.flags")
+      config = config_of(f"--flagfile={_FLAGS / algorithm}.flags")
       self.assertEqual(config.algorithm, algorithm)
     self.assertLessEqual(len(list(_FLAGS.iterdir())), 16)
 
@@ -222,9 +214,9 @@ class FlagfilesTest(parameterized.TestCase):
   def test_transfers_come_from_where_the_papers_do(self, main_task, source):
     path = _FLAGS / "lfgp_transfer.flags"
     task = f"--config.main_task={main_task}"
-    config = resolve(f"--flagfile={path}", task)
+    config = config_of(f"--flagfile={path}", task)
     self.assertEqual(config.transfer_from, f"runs/lfgp_{source}")
     path = _FLAGS / "sacx.flags"
-    config = resolve(f"--flagfile={path}", task, "--config.transfer_from=")
+    config = config_of(f"--flagfile={path}", task, "--config.transfer_from=")
     self.assertEqual(config.agent.scheduler.kind, "conditional_weighted")
     self.assertEqual(config.transfer_from, "")

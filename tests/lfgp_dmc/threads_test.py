@@ -1,6 +1,7 @@
 """How threads wait, in commands and where the user chose."""
 
 import os
+import platform
 import subprocess
 import sys
 from unittest import mock
@@ -13,6 +14,18 @@ _COMMAND = """
 import os, sys
 from lfgp_dmc.launch import command
 command.run(lambda: print(os.environ.get("OMP_WAIT_POLICY"), *sys.modules))
+"""
+
+_ALLOCATIONS = """
+import resource
+from lfgp_dmc import threads
+threads.keep_memory()
+def faults():
+  blocks = [bytearray(1 << 22) for _ in range(16)]
+  del blocks
+  return resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+before = [faults() for _ in range(3)]
+print(faults() - before[-1])
 """
 
 
@@ -35,3 +48,10 @@ class ThreadsTest(absltest.TestCase):
       with mock.patch.dict(os.environ, {name: value}, clear=True):
         threads.wait_passively()
         self.assertEqual(dict(os.environ), {name: value})
+
+  @absltest.skipUnless(platform.libc_ver()[0] == "glibc", "of glibc's malloc")
+  def test_freed_memory_is_used_again_without_a_page_fault(self):
+    done = subprocess.run(
+      [sys.executable, "-c", _ALLOCATIONS], capture_output=True, text=True
+    )
+    self.assertLess(int(done.stdout), 100, done.stderr)
