@@ -111,8 +111,9 @@ def make_learner(
   networks.flatten(dtype)
   on_gpu = generator.device.type == "cuda"
   second = None
-  if threads > 1 and isinstance(config.reward, DiscriminatorReward):
-    second = None if on_gpu else SecondThread(threads)
+  has_discriminators = isinstance(config.reward, DiscriminatorReward)
+  if threads > 1 and has_discriminators and not on_gpu:
+    second = SecondThread(threads)
   prior = None
   if networks.prior is not None:
     prior = Prior(config.prior, networks.prior, generator.device)

@@ -84,7 +84,7 @@ class LfgpLearner:
       start = at_once
       trained = start(self.reward.update, draw)
       batch = self.reward.label(draw.batch)
-      following = functools.partial(self.critics.following, batch.next_inputs)
+      following = start(self.critics.following, batch.next_inputs)
     metrics = self.critics.update(batch, following)
     followed = start(self.critics.update_targets)
     if trains_intentions:

@@ -16,6 +16,7 @@ import numpy as np
 from dm_env import specs
 
 from lfgp_dmc import observations
+from lfgp_dmc.observations import is_frame
 
 TASK_PREFIXES = (
   observations.SUCCESS_PREFIX,
@@ -48,7 +49,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
-  names += filter(observations.is_frame, spec)
+  names += filter(is_frame, spec)
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -70,7 +71,7 @@ def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
   """
   spec: Any = environment.observation_spec()
   names = spec if isinstance(spec, Mapping) else ()
-  found = [spec[name] for name in filter(observations.is_frame, names)]
+  found = [spec[name] for name in filter(is_frame, names)]
   kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
   if not kinds:
     return ()
@@ -153,11 +154,7 @@ class _Features(_Wrapped):
     """The environment's own, without frames, with `features`."""
     spec = self._environment.observation_spec()
     frames = np.zeros((1, *frame_shape(self._environment)), np.uint8)
-    kept = {
-      name: part
-      for name, part in spec.items()
-      if not observations.is_frame(name)
-    }
+    kept = {name: part for name, part in spec.items() if not is_frame(name)}
     shape = self._encode(frames)[0].shape
     return {**kept, _FEATURES: specs.Array(shape, np.float32, _FEATURES)}
 
@@ -171,14 +168,8 @@ class _Features(_Wrapped):
 
   def _encoded(self, timestep: dm_env.TimeStep) -> dm_env.TimeStep:
     seen = timestep.observation
-    kept = {
-      name: value
-      for name, value in seen.items()
-      if not observations.is_frame(name)
-    }
-    frames = np.stack(
-      [value for name, value in seen.items() if observations.is_frame(name)]
-    )
+    kept = {name: value for name, value in seen.items() if not is_frame(name)}
+    frames = np.stack([value for name, value in seen.items() if is_frame(name)])
     kept[_FEATURES] = self._encode(frames[None])[0]
     return timestep._replace(observation=kept)
 
