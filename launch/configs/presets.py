@@ -142,9 +142,9 @@ _PIXELS: dict[str, Any] = {
 # steps, of which there are two an update; a prior holds where they prefer it.
 _FEW: dict[str, Any] = {
   **_FAST,
-  "env_steps": 72_000,
+  "env_steps": 144_000,
   "mirror_demonstrations": True,
-  "replay_capacity": 72_000,
+  "replay_capacity": 144_000,  # all rows: with half, success falls back
   "shifted_copies": 30,
   "updates_per_step": 0.5,
   "warm_up": 6000,
