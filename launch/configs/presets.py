@@ -173,10 +173,13 @@ _FEW: dict[str, Any] = {
   "agent.scheduler.xi": 12,
 }
 
-# Where a slot is the goal: blue from it, the hand from blue, and the fingers.
+# Where a slot is the goal: blue from it, the hand from blue, and the fingers,
+# sharp enough that a block 3 cm beside the slot is worth another grasp.
 _FEW_SLOT: dict[str, Any] = {
   "agent.reward.kind": "discriminator",
+  "agent.reward.gradient_penalty": 0.01,
   "agent.reward.main_masked": "0:6,8:14,15:38,41:47,50:59",
+  "agent.reward.noise": 0.1,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {
