@@ -34,7 +34,6 @@ _VPACE: dict[str, Any] = {
   "episode_steps": 96,
   "evaluate_every": 25_000,
   "random_steps": 10_000,
-  "replay_capacity": 500_000,
   "warm_up": 5000,
   "agent.critic.polyak": 1e-3,
   "agent.critic.value_penalty": 10.0,
@@ -102,7 +101,6 @@ _FAST_PRECISE: dict[str, Any] = {
   **_WIDE,
   "env_steps": 40_000,
   "mirror_demonstrations": True,
-  "replay_capacity": 40_000,
   "updates_per_step": 0.5,
   "agent.critic.warmup_updates": 4000,
   "agent.intention.learning_rate": 0.00003,
@@ -128,7 +126,6 @@ _PIXELS: dict[str, Any] = {
   "camera_size": 64,
   "env_steps": 40_000,
   "evaluate_every": 10_000,
-  "replay_capacity": 100_000,
   "agent.batch_size": 64,
   "agent.learning_rate": 1e-3,
   "agent.pretraining.updates": 0,
@@ -144,7 +141,6 @@ _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
   "mirror_demonstrations": True,
-  "replay_capacity": 144_000,  # all rows: with half, success falls back
   "shifted_copies": 30,
   "updates_per_step": 0.5,
   "warm_up": 6000,
@@ -197,14 +193,12 @@ OF_TASK: dict[tuple[str, str], dict[str, Any]] = {
   ("vpace", "insert"): {
     "env_steps": 1_000_000,
     "random_steps": 20_000,
-    "replay_capacity": 1_000_000,
   },
   ("few", "bring"): _FEW_SLOT,
   ("few", "insert"): _FEW_SLOT,
   ("fast_precise", "insert"): {
     "bfloat16": False,
     "env_steps": 80_000,
-    "replay_capacity": 80_000,
     "agent.inputs.tanh_feature_scale": 0.01,  # m
     "agent.intention.learning_rate": 0.00001,
   },
