@@ -136,7 +136,8 @@ _PIXELS: dict[str, Any] = {
 # copies too; discriminators see relative positions, heights and fingers, which
 # no few attempts make recognisable by place, and are sharp enough to tell
 # nearly done from done; each task has networks of its own; critics follow fresh
-# steps, of which there are two an update; a prior holds where they prefer it.
+# steps, of which there are two an update; a prior that fades holds where they
+# prefer it.
 _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
@@ -155,6 +156,8 @@ _FEW: dict[str, Any] = {
   "agent.pretraining.learning_rate": 0.001,
   "agent.pretraining.std": 0.15,
   "agent.pretraining.updates": 3000,
+  # To 0.04: where values are nearly flat, the prior holds the mean action still.
+  "agent.prior.decay": 0.99995,
   "agent.prior.q_filter": True,
   "agent.prior.weight": 1.0,
   "agent.reward.every": 2,
