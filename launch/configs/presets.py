@@ -156,7 +156,7 @@ _FEW: dict[str, Any] = {
   "agent.pretraining.learning_rate": 0.001,
   "agent.pretraining.std": 0.15,
   "agent.pretraining.updates": 3000,
-  # To 0.04: where values are nearly flat, the prior holds the mean action still.
+  # To 0.04: where values are nearly flat, a prior holds the hand still.
   "agent.prior.decay": 0.99995,
   "agent.prior.q_filter": True,
   "agent.prior.weight": 1.0,
