@@ -76,7 +76,7 @@ class RunConfig:
   evaluation_workers: Processes = 0  # processes; 0: one a core
 
   # Resources.
-  replay_capacity: PositiveInt = 4_000_000  # transitions; disk as they fill
+  replay_capacity: PositiveInt = 4_000_000  # transitions, on disk as they come
   device: Text = "auto"  # cpu, cuda, ...; auto: cuda where there is one
   # 0: one a core that this process may use. Of two, one trains discriminators
   # while the other trains critics and intentions.
