@@ -16,11 +16,11 @@ class DeviceReplay:
   """A copy of the rows that can be sampled, brought up to date as they grow."""
 
   def __init__(self, replay: Replay, device: torch.device):
-    """Takes memory for the whole capacity: 488 bytes a row at 59 + 4 floats."""
+    """Takes memory as rows come: 488 bytes a row at 59 + 4 floats."""
     self._replay = replay
     observations, actions = replay.widths
     self._columns = [
-      torch.empty((replay.capacity, width), device=device)
+      torch.empty((0, width), device=device)
       for width in (observations, actions, observations)
     ]
     self._copied = 0  # rows below this number are here
@@ -36,6 +36,7 @@ class DeviceReplay:
   def _catch_up(self) -> None:
     """Copies what was added, and anew what was withdrawn and replaced."""
     replay = self._replay
+    self._make_room(min(replay.total, replay.capacity))
     oldest = replay.total - len(replay)
     start = max(oldest, min(self._copied, replay.take_low_mark()))
     for first in range(start, replay.total, _CHUNK):
@@ -46,3 +47,14 @@ class DeviceReplay:
         rows = rows.to(column.device)
         column[rows] = torch.from_numpy(values).to(column.device)
     self._copied = replay.total
+
+  def _make_room(self, rows: int) -> None:
+    """Doubles the memory when it is full; one column at a time is copied."""
+    size = len(self._columns[0])
+    if rows <= size:
+      return
+    size = min(max(rows, 2 * size, _CHUNK), self._replay.capacity)
+    for i, column in enumerate(self._columns):
+      larger = column.new_empty((size, column.shape[1]))
+      larger[: len(column)] = column
+      self._columns[i] = larger

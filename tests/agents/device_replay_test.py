@@ -1,10 +1,13 @@
 """The copy of the replay on the device always holds what the replay holds."""
 
+from unittest import mock
+
 import numpy as np
 import torch
 from absl.testing import absltest
 
 from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.lfgp import device_replay
 from lfgp_dmc.agents.lfgp.device_replay import DeviceReplay
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.types import Transition
@@ -51,3 +54,11 @@ class DeviceReplayTest(absltest.TestCase):
     self._add(70)
     self.rows = DeviceReplay(self.replay, torch.device("cpu"))
     self._check()
+
+  def test_takes_memory_for_the_rows_that_there_are(self):
+    self.enter_context(mock.patch.object(device_replay, "_CHUNK", 8))
+    for count, room in ((3, 8), (6, 16), (20, 32), (30, 50), (40, 50)):
+      self._add(count)
+      self._check()
+      for column in self.rows._columns:
+        self.assertLen(column, room)
