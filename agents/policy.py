@@ -69,6 +69,20 @@ class Policy:
     return Policy(single, checked.tasks, scale, shape)
 
   @classmethod
+  def from_state(
+    cls, state: Mapping[str, Any], options: Mapping[str, Any]
+  ) -> "Policy":
+    """Builds the policy of an agent's `state_dict()`, such as checkpoints hold.
+
+    Raises:
+      ValueError: see `from_arrays`.
+    """
+    arrays = state.get("best")  # of behaviour cloning
+    if arrays is None:
+      arrays = state["learner"]["networks"]["intentions"]
+    return cls.from_arrays(arrays, options)
+
+  @classmethod
   def load(cls, folder: str | os.PathLike[str]) -> "Policy":
     """Reads a policy folder: `config.json` and `policy.safetensors`.
 

@@ -1,10 +1,13 @@
 """Evaluates a run, a stored policy or the scripted expert.
 
   python launch/evaluate.py --run=runs/stack_1 --episodes=50 --tasks=all
+  python launch/evaluate.py --run=runs/stack_1 --checkpoints=3 --episodes=100
   python launch/evaluate.py --expert=scripted --tasks=reach,lift
 
 Every intention plays whole episodes in the main task's environment, by its
-mean action; the reset of episode i depends on (--seed, i) alone.
+mean action; the reset of episode i depends on (--seed, i) alone. With
+--checkpoints the run's last ones play instead of its policy, each on resets of
+its own, from --seed on: their mean is an end that no checkpoint was chosen for.
 """
 
 import functools
@@ -32,6 +35,9 @@ _TASKS = flags.DEFINE_string(
 )
 _EPISODES = flags.DEFINE_integer("episodes", 50, "Episodes a task.", 1)
 _SEED = flags.DEFINE_integer("seed", 0, "Of the resets.", 0)
+_CHECKPOINTS = flags.DEFINE_integer(
+  "checkpoints", 0, "With --run: so many of its last checkpoints; see above.", 0
+)
 _WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.", 0)
 _MAIN_TASK = flags.DEFINE_enum(
   "main_task",
@@ -57,17 +63,23 @@ def main() -> None:
   if output is not None:
     _known(output)  # better refused now than after all episodes
   rows: list[evaluation_csv.EvaluationRow] = []
-  for spec, tasks in _plan():
-    rows += evaluation.evaluate(
+  for spec, tasks, seed in _plan():
+    found = evaluation.evaluate(
       functools.partial(spec.environment_spec.build, True),
       spec.make,
       tasks,
       _EPISODES.value,
-      _SEED.value,
+      seed,
       _WORKERS.value or command.cores(),
       env_step=spec.env_step,
       draws=bool(spec.environment_spec.camera_size),
     )
+    if _CHECKPOINTS.value:
+      print(f"after {spec.env_step} environment steps, resets of seed {seed}:")
+      print(f"{evaluation_csv.success_table(found)}\n")
+    rows += found
+  if _CHECKPOINTS.value:
+    print(f"all {_CHECKPOINTS.value} checkpoints:")
   print(evaluation_csv.success_table(rows))
   if output is not None:
     output.parent.mkdir(parents=True, exist_ok=True)
@@ -77,20 +89,25 @@ def main() -> None:
     print(f"\n{output}")
 
 
-def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...]]]:
-  """Policies and their tasks; an expert plays each in its own environment."""
-  if _RUN.value or not _EXPERT.value:
+def _plan() -> list[tuple[policies.PolicySpec, tuple[str, ...], int]]:
+  """Policies, their tasks and the seeds of their resets.
+
+  An expert plays each task in its own environment.
+  """
+  seed, count = _SEED.value, _CHECKPOINTS.value
+  if _RUN.value or not _EXPERT.value or count:
     spec = policies.find(_RUN.value, _EXPERT.value)
-    return [(spec, choose_tasks(_TASKS.value, spec.tasks))]
+    specs = policies.at_checkpoints(spec, count) if count else [spec]
+    tasks = choose_tasks(_TASKS.value, spec.tasks)
+    return [(one, tasks, seed + i) for i, one in enumerate(specs)]
   expert = functools.partial(
     policies.find, "", policies.SCRIPTED, control_hz=_HERTZ.value
   )
   if own := _MAIN_TASK.value:
-    return [
-      (expert(task=own), choose_tasks(_TASKS.value, lfgp_dmc.task_set(own)))
-    ]
+    tasks = choose_tasks(_TASKS.value, lfgp_dmc.task_set(own))
+    return [(expert(task=own), tasks, seed)]
   tasks = choose_tasks(_TASKS.value, lfgp_dmc.ALL_TASKS)
-  return [(expert(task=task), (task,)) for task in tasks]
+  return [(expert(task=task), (task,), seed) for task in tasks]
 
 
 def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:

@@ -13,7 +13,8 @@ from typing import Any
 import lfgp_dmc
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
-from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs import checkpoints, run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.types import Actor
 
 SCRIPTED = "scripted"
@@ -49,6 +50,14 @@ def stored_policy(folder: str) -> Actor:
   from lfgp_dmc.agents.policy import Policy
 
   return Policy.load(folder)
+
+
+def checkpointed_policy(folder: str, checkpoint: str) -> Actor:
+  """Reads the policy that a run had at one of its checkpoints."""
+  from lfgp_dmc.agents.policy import Policy
+
+  options = run_folder.read_config(folder)[run_folder.POLICY_FIELD]
+  return Policy.from_state(checkpoints.load(checkpoint)["agent"], options)
 
 
 def find(
@@ -97,3 +106,28 @@ def find(
     config,
     int(config.get("policy", {}).get("env_step", 0)),
   )
+
+
+def at_checkpoints(spec: PolicySpec, count: int) -> list[PolicySpec]:
+  """A run's policies at its last `count` checkpoints, oldest first.
+
+  Raises:
+    UserError: there are fewer, or one of them is damaged.
+  """
+  found = []
+  if spec.folder is not None:
+    found = checkpoints.every(RunFolder(spec.folder).checkpoints)
+  if len(found) < count:
+    raise UserError(
+      f"--checkpoints={count}: {spec.folder or 'the scripted expert'} has "
+      f"{len(found)} checkpoints"
+    )
+  specs = []
+  for path in found[-count:]:
+    make = functools.partial(checkpointed_policy, str(spec.folder), str(path))
+    try:
+      make()
+    except (ValueError, KeyError, OSError) as error:
+      raise UserError(f"{path}: {error}") from None
+    specs.append(dataclasses.replace(spec, make=make, env_step=int(path.name)))
+  return specs

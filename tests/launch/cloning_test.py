@@ -8,6 +8,7 @@ from absl.testing import parameterized
 import lfgp_dmc
 from lfgp_dmc.agents.bc.agent import BcAgent
 from lfgp_dmc.data import evaluation_csv
+from lfgp_dmc.launch import policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
 from tests import fixtures as shared
@@ -42,7 +43,11 @@ class CloningTest(fixtures.RunTest):
     self.assertEqual(evaluated[-1].env_step, progress.update)
     self.assertFalse((run / "replay").exists())
     act = lfgp_dmc.load_policy(run, tasks[-1])
-    self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
+    seen = np.zeros(2, np.float32)
+    self.assertEqual(act(seen).shape, (2,))
+    (last,) = policies.at_checkpoints(policies.find(str(run)), 1)
+    acted = last.make().act(seen, tasks[-1])
+    np.testing.assert_array_equal(acted, act(seen))
     stored = run_folder.read_config(run)["policy"]
     self.assertEqual(stored["env_step"], progress.update)
 

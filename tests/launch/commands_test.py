@@ -4,8 +4,10 @@ import json
 import pathlib
 import subprocess
 
+import numpy as np
 from absl.testing import absltest
 
+import lfgp_dmc
 from lfgp_dmc import graphics, task_names
 from lfgp_dmc.data import csv_files, evaluation_csv
 from lfgp_dmc.launch import command, policies, training
@@ -90,6 +92,30 @@ class BlockRunTest(absltest.TestCase):
     done = self._call(line)
     self.assertEqual(done.returncode, 1)
     self.assertIn("exists; choose another --output", done.stderr)
+
+  def test_evaluates_the_last_checkpoints_each_on_its_own_resets(self):
+    line = "evaluate.py --run=runs/tiny --episodes=1 --workers=1 --seed=3 "
+    done = self._call(f"{line} --checkpoints=2 --output=ends")
+    self.assertEqual(done.returncode, 0, done.stderr)
+    rows = evaluation_csv.read_csv(self.folder / "ends" / "evaluation.csv")
+    steps = [row.env_step for row in rows]
+    self.assertEqual([row.seed for row in rows], [3, 4])
+    self.assertLess(steps[0], 400)
+    self.assertEqual(steps[1], 400)
+    self.assertRegex(done.stdout, rf"after {steps[0]} .* resets of seed 3:")
+    self.assertRegex(done.stdout, r"all 2 checkpoints:\n.*\nbring .* 2 ")
+    earlier, last = policies.at_checkpoints(policies.find(str(self.path)), 2)
+    seen = np.linspace(-1, 1, 59, dtype=np.float32)
+    stored = lfgp_dmc.load_policy(self.path)(seen)
+    np.testing.assert_array_equal(last.make().act(seen), stored)
+    self.assertGreater(np.abs(earlier.make().act(seen) - stored).max(), 0)
+    for actor, named in (
+      ("--run=runs/tiny", "runs/tiny"),
+      ("--expert=scripted", "scripted expert"),
+    ):
+      done = self._call(f"evaluate.py {actor} --checkpoints=99")
+      self.assertEqual(done.returncode, 1)
+      self.assertRegex(done.stderr, rf"{named} has \d checkpoints")
 
   def test_evaluates_the_expert(self):
     done = self._call("evaluate.py --expert=scripted --tasks=reach "
