@@ -42,6 +42,9 @@ class CriticConfig:
   discount: Share = 0.99  # gamma, a step
   polyak: PositiveShare = 0.005  # share of the online network
   warmup_updates: Count = 0  # first updates, without the intentions
+  # What critics do not see of an observation, such as 3:6,53:59: of few rows
+  # they learn by heart whose return was high.
+  masked: Slices = ""
   value_penalty: NonNegative = 0.0  # lambda, on values out of bounds
   value_penalty_window: PositiveInt = 50  # updates of the bounds' medians
 
@@ -152,6 +155,11 @@ class LfgpConfig:
       faults.append(
         "networks.actor_trunk is 'shared'; valid: own, if there are "
         "pretraining.updates (the critics' loss would undo them)"
+      )
+    if self.critic.masked and self.shares_trunk:
+      faults.append(
+        f"critic.masked is {self.critic.masked!r}; valid: nothing, if "
+        "networks.actor_trunk is 'shared' (intentions see what critics see)"
       )
     if faults:
       raise ValueError("\n".join(faults))

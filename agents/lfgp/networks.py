@@ -72,9 +72,13 @@ def make_networks(
   own = config.networks
   sizes = (tasks, own.hidden_size, actions, generator)
   critics = layouts.make_critics(
-    own.layout, standardiser.input_size, *sizes, own.critic_layer_norm
+    own.layout,
+    standardiser.input_size,
+    *sizes,
+    own.critic_layer_norm,
+    masked_inputs(config.critic.masked, standardiser),
   ).to(device)
-  trunk = critics.trunk if own.actor_trunk == "shared" else None
+  trunk = critics.trunk if config.shares_trunk else None
   intentions = layouts.make_intentions(
     own.layout, standardiser, *sizes, trunk, encoder
   ).to(device)

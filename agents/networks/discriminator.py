@@ -10,6 +10,7 @@ from lfgp_dmc.agents.networks.discriminator_passes import (
 )
 from lfgp_dmc.agents.networks.flat import FlatModule, in_products
 from lfgp_dmc.agents.networks.linear import make_linear
+from lfgp_dmc.agents.networks.trunk import Selection
 
 
 class Discriminator(FlatModule):
@@ -18,8 +19,6 @@ class Discriminator(FlatModule):
   The k-th sigmoid is the probability that a pair comes from the expert of
   task k (the paper's supplement, model architectures).
   """
-
-  seen: torch.Tensor
 
   def __init__(
     self,
@@ -34,18 +33,15 @@ class Discriminator(FlatModule):
     """Sees "state_action" (paper) or "state", but the `masked` of O floats."""
     super().__init__()
     self.sees_action = inputs == "state_action"
-    seen = torch.tensor(sorted({*range(observations)} - {*masked}))
-    self.register_buffer("seen", seen, persistent=False)
-    self.sees_all = len(seen) == observations
-    size = len(seen) + (actions if self.sees_action else 0)
+    self.selection = Selection(observations, masked)
+    size = self.selection.size + (actions if self.sees_action else 0)
     self.first = make_linear(size, hidden, generator)
     self.second = make_linear(hidden, hidden, generator)
     self.output = make_linear(hidden, tasks, generator)
 
   def join(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Lays out what the discriminator sees, [..., I]."""
-    if not self.sees_all:
-      inputs = inputs[..., self.seen]
+    inputs = self.selection(inputs)
     if self.sees_action:
       return torch.cat([inputs, action], dim=-1)
     return inputs

@@ -6,13 +6,15 @@ single-task networks): no trunk, each head has two layers of H of its own: with
 K = 1 the intention is O-H-H-2A, each critic (O + A)-H-H-1.
 """
 
+from collections.abc import Sequence
+
 import torch
 from torch import nn
 
 from lfgp_dmc.agents.networks.critics import CriticNetwork, TwinCriticHeads
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
-from lfgp_dmc.agents.networks.trunk import Standardiser, Trunk
+from lfgp_dmc.agents.networks.trunk import Selection, Standardiser, Trunk
 
 SHARED_TRUNK, SEPARATE = "shared_trunk", "separate"
 
@@ -44,10 +46,14 @@ def make_critics(
   actions: int,
   generator: torch.Generator,
   layer_norm: bool = False,
+  masked: Sequence[int] = (),
 ) -> CriticNetwork:
-  """Draws 2K critics."""
-  trunk = _make_trunk(layout, inputs, hidden, generator)
-  features, layers = _of_heads(layout, inputs, hidden)
+  """Draws 2K critics, which do not see the `masked` inputs."""
+  selection = Selection(inputs, masked)
+  trunk = _make_trunk(layout, selection.size, hidden, generator)
+  if not selection.sees_all:
+    trunk = nn.Sequential(selection, trunk)
+  features, layers = _of_heads(layout, selection.size, hidden)
   heads = TwinCriticHeads(
     tasks, features, hidden, actions, generator, layer_norm, layers
   )

@@ -1,5 +1,7 @@
 """The shared first layers, and the standardisation of what goes into them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from torch import nn
@@ -52,6 +54,24 @@ class Standardiser(nn.Module):
   def input_size(self) -> int:
     """Floats that a network gets: O, or 2 O with tanh features."""
     return len(self.mean) * (2 if self.tanh_feature_scale else 1)
+
+
+class Selection(nn.Module):
+  """The inputs of a network that is not to see all of them."""
+
+  seen: torch.Tensor
+
+  def __init__(self, inputs: int, masked: Sequence[int] = ()):
+    """Leaves out the `masked` of so many inputs."""
+    super().__init__()
+    seen = torch.tensor(sorted({*range(inputs)} - {*masked}))
+    self.register_buffer("seen", seen, persistent=False)
+    self.size = len(seen)
+    self.sees_all = self.size == inputs
+
+  def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+    """Maps inputs [..., I] to those that are seen."""
+    return inputs if self.sees_all else inputs.index_select(-1, self.seen)
 
 
 class Trunk(nn.Module):

@@ -51,6 +51,7 @@ class LfgpConfigTest(parameterized.TestCase):
     ("scheduler.kind", "greedy", "'q_table', 'weighted_random'"),
     ("gama", 0.9, "gama"),
     ("pretraining.updates", 10, "own, if there are pretraining.updates"),
+    ("critic.masked", "3:6", "nothing, if networks.actor_trunk is 'shared'"),
   )
   def test_errors_say_what_is_valid(self, name, value, valid):
     with self.assertRaisesRegex(ValueError, valid):

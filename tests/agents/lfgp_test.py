@@ -186,6 +186,23 @@ class BatchTest(absltest.TestCase):
     with self.assertRaisesRegex(ValueError, "5:7; the observation has 6"):
       make_agent(**{"reward.masked": "5:7"})
 
+  def test_critics_do_not_see_masked_floats_and_intentions_do(self):
+    raw = torch.stack([torch.zeros(OBS), *torch.eye(OBS)[[2, 3]]])
+    action = torch.zeros(3, A)
+    mask = {"inputs.tanh_feature_scale": 0.1, "critic.masked": "1:3"}
+    for change in {"layout": "separate"}, {"actor_trunk": "own"}:
+      fields = {f"networks.{name}": value for name, value in change.items()}
+      networks = make_agent(**fields, **mask).learner.networks
+      inputs = networks.intentions.standardiser(raw)
+      for critics in (networks.critics, networks.target_critics):
+        plain, masked, seen = critics(inputs, action).unbind(-1)
+        torch.testing.assert_close(masked, plain)
+        self.assertGreater((seen - plain).abs().min(), 0)
+      plain, masked, _ = networks.intentions(inputs)[0].unbind(1)
+      self.assertGreater((masked - plain).abs().min(), 0)
+    with self.assertRaisesRegex(ValueError, "5:7; the observation has 6"):
+      make_agent(**fields, **mask | {"critic.masked": "5:7"})
+
 
 class DeterminismTest(parameterized.TestCase):
   def test_same_seed_same_numbers(self):
@@ -203,6 +220,7 @@ class DeterminismTest(parameterized.TestCase):
     {"pretraining.updates": 3, "reward.expert_share": 0.1},
     {"prior.weight": 1.0, "prior.decay": 0.9},
     {"reward.main_masked": "0:2"},
+    {"critic.masked": "0:2"},
     {"networks.layout": "separate", "critic.value_penalty": 10.0},
     {"threads": 2},
   )
