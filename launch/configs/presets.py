@@ -133,11 +133,11 @@ _PIXELS: dict[str, Any] = {
 }
 
 # For 10 to 20 attempts a task: every attempt counts as its images and shifted
-# copies too; discriminators see relative positions, heights and fingers, which
-# no few attempts make recognisable by place, and are sharp enough to tell
-# nearly done from done; each task has networks of its own; critics follow fresh
-# steps, of which there are two an update; a prior that fades holds where they
-# prefer it.
+# copies too; discriminators and critics see relative positions, heights and
+# fingers, so that no few rows are recognisable by place; discriminators are
+# sharp enough to tell nearly done from done; each task has networks of its own;
+# critics follow fresh steps, of which there are two an update; a prior that
+# fades holds where they prefer it.
 _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
@@ -146,6 +146,7 @@ _FEW: dict[str, Any] = {
   "updates_per_step": 0.5,
   "warm_up": 6000,
   "agent.critic.learning_rate": 0.001,
+  "agent.critic.masked": "0:2,3:6,8:14,15:21,22:38,41:44,50:59",
   "agent.critic.polyak": 0.03,
   "agent.critic.warmup_updates": 4000,
   "agent.final_rows": 2,
