@@ -135,9 +135,9 @@ _PIXELS: dict[str, Any] = {
 # For 10 to 20 attempts a task: every attempt counts as its images and shifted
 # copies too; discriminators and critics see relative positions, heights and
 # fingers, so that no few rows are recognisable by place; discriminators are
-# sharp enough to tell nearly done from done; each task has networks of its own;
-# critics follow fresh steps, of which there are two an update; a prior that
-# fades holds where they prefer it.
+# sharp: a block 3 cm beside its goal has to be worth another grasp. Each task
+# has networks of its own; critics follow fresh steps, of which there are two an
+# update; a prior that fades holds where they prefer it.
 _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
@@ -163,23 +163,20 @@ _FEW: dict[str, Any] = {
   "agent.prior.weight": 1.0,
   "agent.reward.every": 2,
   "agent.reward.expert_share": 0.5,
-  "agent.reward.gradient_penalty": 0.03,
+  "agent.reward.gradient_penalty": 0.01,
   "agent.reward.gradient_penalty_per_task": True,
   "agent.reward.intentions_on_experts": False,
   "agent.reward.main_expert_share": 0.5,
   "agent.reward.masked": "0:2,3:6,8:14,15:21,22:38,47:59",
-  "agent.reward.noise": 0.2,
+  "agent.reward.noise": 0.1,
   "agent.scheduler.kind": "weighted_random_handcrafted",
   "agent.scheduler.xi": 12,
 }
 
-# Where a slot is the goal: blue from it, the hand from blue, and the fingers,
-# sharp enough that a block 3 cm beside the slot is worth another grasp.
+# Where a slot is the goal: blue from it, the hand from blue, and the fingers.
 _FEW_SLOT: dict[str, Any] = {
   "agent.reward.kind": "discriminator",
-  "agent.reward.gradient_penalty": 0.01,
   "agent.reward.main_masked": "0:6,8:14,15:38,41:47,50:59",
-  "agent.reward.noise": 0.1,
 }
 
 PRESETS: dict[str, dict[str, Any]] = {
