@@ -6,12 +6,13 @@ Autograd takes the same derivatives (a test holds them together) but keeps more
 and multiplies more.
 """
 
-import functools
 from typing import Any
 
 import torch
 from torch.autograd.function import once_differentiable
 from torch.nn import functional
+
+from lfgp_dmc.agents.networks.linear import has_bfloat16
 
 # Below: R rows with logits, M mixed rows with an input gradient, I inputs,
 # H hidden units, K logits. x -> tanh -> first -> tanh -> second -> logits.
@@ -32,17 +33,10 @@ def tanh_layer(
   if inputs.dtype == torch.float32:
     double = torch.addmm(bias, inputs, weight.t(), beta=2, alpha=2)
     return double.sigmoid_().mul_(2).sub_(1)
-  if inputs.is_cpu and _has_bfloat16():
+  if inputs.is_cpu and has_bfloat16():
     own = torch.ops.mkldnn
     return own._linear_pointwise(inputs, weight, bias, "tanh", [], "")
   return torch.addmm(bias, inputs, weight.t()).tanh_()
-
-
-@functools.cache
-def _has_bfloat16() -> bool:
-  if not torch.backends.mkldnn.is_available():
-    return False
-  return torch.ops.mkldnn._is_mkldnn_bf16_supported()
 
 
 class DiscriminatorPasses(torch.autograd.Function):

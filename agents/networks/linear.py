@@ -1,5 +1,6 @@
 """Linear layers with an explicit generator: single, and stacked by task."""
 
+import functools
 import math
 
 import torch
@@ -7,6 +8,14 @@ from torch import nn
 from torch.nn import functional
 
 from lfgp_dmc.agents.networks.flat import in_products
+
+
+@functools.cache
+def has_bfloat16() -> bool:
+  """Whether the CPU has bfloat16 products; else they are emulated, slowly."""
+  if not torch.backends.mkldnn.is_available():
+    return False
+  return torch.ops.mkldnn._is_mkldnn_bf16_supported()
 
 
 def initialise_(

@@ -5,12 +5,14 @@ import signal
 from unittest import mock
 
 import numpy as np
+from absl import logging
 from absl.testing import parameterized
 
 import lfgp_dmc
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents import cloning
 from lfgp_dmc.data import demonstrations, evaluation_csv
+from lfgp_dmc.launch import assemble
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run, run_folder
 from lfgp_dmc.runs.schedule import Progress
@@ -37,6 +39,18 @@ class TrainingTest(fixtures.RunTest):
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
     stored = run_folder.read_config(run)
     self.assertEqual(stored["policy"]["env_step"], 200)
+
+  @parameterized.parameters((False, True), (True, True), (False, False))
+  def test_warns_where_bfloat16_is_emulated(self, has_products, is_asked_for):
+    config = self.config(bfloat16=is_asked_for, env_steps=20)
+    with (
+      mock.patch.object(assemble, "has_bfloat16", lambda: has_products),
+      self.assertLogs() as found,
+    ):
+      logging.info("so that there is a line")
+      self.train(config)
+    is_told = any("--config.bfloat16=False" in line for line in found.output)
+    self.assertEqual(is_told, is_asked_for and not has_products)
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
