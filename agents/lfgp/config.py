@@ -125,8 +125,6 @@ class PriorConfig:
   distance: Literal["squared_error", "divergence"] = "squared_error"
   normalise: Switch = False  # times each task's mean |Q|
   decay: Share = 1.0  # factor on the weight, an update
-  # Only on rows where the critics prefer its action (Nair et al., 2018).
-  q_filter: Switch = False
 
 
 @checked

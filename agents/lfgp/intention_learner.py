@@ -1,7 +1,5 @@
 """The intentions' part of an update, and their temperatures'."""
 
-import functools
-
 import torch
 
 from lfgp_dmc.agents.lfgp.config import IntentionConfig
@@ -55,8 +53,7 @@ class IntentionLearner:
       log_prob, q, networks.log_temperature.detach().exp()
     )
     if self._prior is not None:
-      values = functools.partial(networks.critics.heads, critic_features)
-      term, more = self._prior(inputs, mean, std, q.detach(), values)
+      term, more = self._prior(inputs, mean, std, q.detach())
       loss, metrics = loss + term, metrics | more
     norm = self.optimisers["policy"].step(loss)
     saturated = (action.detach().abs() > _SATURATED).float()

@@ -1,6 +1,6 @@
 """A regulariser of the policy loss: distance from a frozen prior."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import torch
@@ -75,32 +75,22 @@ class Prior:
     mean: torch.Tensor,
     std: torch.Tensor,
     q: torch.Tensor,
-    values: Callable[[torch.Tensor], torch.Tensor],
   ) -> tuple[torch.Tensor, Metrics]:
     """The weighted distance, and the unweighted one by task.
 
     At the replay's inputs [B, O]: the intentions' mean and std [K, B, A] before
-    the tanh, and the critics' values [2, K, B], without gradient; and what
-    gives those of other actions [K, B, A].
+    the tanh, and the critics' values [2, K, B], without gradient.
     """
-    mask = None
     with torch.no_grad():
       prior_mean, prior_std = self._network(inputs)
-      if self._config.q_filter:
-        own, prior = (
-          values(torch.tanh(part)).amin(0) for part in (mean, prior_mean)
-        )
-        mask = (prior > own).float()
     weight = (self._config.weight * self._faded).expand(len(mean))
     if self._config.normalise:
       weight = weight * torch.minimum(q[0], q[1]).abs().mean(-1)
     if self._config.distance == "divergence":
-      loss, metrics = divergence_loss(
-        mean, std, prior_mean, prior_std, weight, mask
-      )
+      loss, metrics = divergence_loss(mean, std, prior_mean, prior_std, weight)
     else:
       loss, metrics = behaviour_cloning_loss(
-        mean, torch.tanh(prior_mean), weight, mask
+        mean, torch.tanh(prior_mean), weight
       )
     return loss, {"distance_from_prior": metrics["behaviour_cloning"]}
 

@@ -18,7 +18,6 @@ def behaviour_cloning_loss(
   mean: torch.Tensor,
   action: torch.Tensor,
   weight: torch.Tensor | None = None,
-  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
   """sum_a (tanh(mean) - a)^2, mean over rows, all tasks equal.
 
@@ -26,10 +25,9 @@ def behaviour_cloning_loss(
     mean: [K, N, A], task k's mean before the tanh, for task k's rows.
     action: [K, N, A], the expert's.
     weight: [K], a factor a task; None: 1 / K each. By-task metrics have none.
-    mask: [K, N], a factor a row; None: 1 each.
   """
   error = (torch.tanh(mean) - action).square().sum(-1)
-  return _over_tasks(error, weight, mask)
+  return _over_tasks(error, weight)
 
 
 def likelihood_loss(
@@ -58,28 +56,26 @@ def divergence_loss(
   prior_mean: torch.Tensor,
   prior_std: torch.Tensor,
   weight: torch.Tensor | None = None,
-  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
   """KL(pi || prior) in nats, mean over rows, all tasks equal.
 
   That of two Gaussians, as the tanh of both changes nothing; their mean and
   std are [K, N, A]. Where the prior is more precise than `LEAST_STD`, the
   means' distance counts in units of that, so that the intention can still
-  move; std are compared as they are, down to `LEAST_COMPARED`. `weight` and
-  `mask` are as in `behaviour_cloning_loss`.
+  move; std are compared as they are, down to `LEAST_COMPARED`. `weight` is as
+  in `behaviour_cloning_loss`.
   """
   ratio = std / prior_std.clamp(min=LEAST_COMPARED)
   shift = (mean - prior_mean) / prior_std.clamp(min=LEAST_STD)
   divergence = 0.5 * (ratio.square() + shift.square() - 1.0) - ratio.log()
-  return _over_tasks(divergence.sum(-1), weight, mask)
+  return _over_tasks(divergence.sum(-1), weight)
 
 
 def _over_tasks(
   by_row: torch.Tensor,
   weight: torch.Tensor | None = None,
-  mask: torch.Tensor | None = None,
 ) -> tuple[torch.Tensor, Metrics]:
-  by_task = (by_row if mask is None else mask * by_row).mean(-1)
+  by_task = by_row.mean(-1)
   loss = by_task.mean() if weight is None else (weight * by_task).sum()
   return loss, {
     "loss/behaviour_cloning": loss.detach(),

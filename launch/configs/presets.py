@@ -137,7 +137,7 @@ _PIXELS: dict[str, Any] = {
 # fingers, so that no few rows are recognisable by place; discriminators are
 # sharp: a block 3 cm beside its goal has to be worth another grasp. Each task
 # has networks of its own; critics follow fresh steps, of which there are two an
-# update; a prior that fades holds where they prefer it.
+# update. The intentions start from cloning, and nothing holds them there.
 _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
@@ -151,16 +151,14 @@ _FEW: dict[str, Any] = {
   "agent.critic.warmup_updates": 4000,
   "agent.final_rows": 2,
   "agent.intention.initial_temperature": 0.001,
+  "agent.intention.learning_rate": 3e-4,
   "agent.intention.target_entropy": -8.0,
   "agent.intention.temperature_learning_rate": 0.0003,
   "agent.networks.layout": "separate",
   "agent.pretraining.learning_rate": 0.001,
   "agent.pretraining.std": 0.15,
   "agent.pretraining.updates": 3000,
-  # To 0.04: where values are nearly flat, a prior holds the hand still.
-  "agent.prior.decay": 0.99995,
-  "agent.prior.q_filter": True,
-  "agent.prior.weight": 1.0,
+  "agent.prior.weight": 0.0,  # where values are flat, it holds the hand still
   "agent.reward.every": 2,
   "agent.reward.expert_share": 0.5,
   "agent.reward.gradient_penalty": 0.01,
@@ -190,11 +188,9 @@ _FEW_INSERT: dict[str, Any] = {
   "agent.critic.warmup_updates": 0,
   "agent.inputs.tanh_feature_scale": 0.01,  # m
   "agent.intention.initial_temperature": 0.01,
-  "agent.intention.learning_rate": 3e-4,
   "agent.intention.target_entropy": -12.0,
   "agent.pretraining.std": 0.0,
   "agent.pretraining.updates": 0,
-  "agent.prior.weight": 0.0,
   "agent.reward.kind": "discriminator",
   "agent.reward.gradient_penalty": 0.003,
   "agent.reward.main_masked": "0:6,8:14,15:47,50:59",

@@ -110,34 +110,11 @@ class PriorTest(parameterized.TestCase):
     losses = []
     for updates in (0, 1, 2):
       prior.fade(updates)
-      loss, found = prior(inputs, mean, std, q, lambda action: q)
+      loss, found = prior(inputs, mean, std, q)
       losses.append(loss.item())
     by_hand = 2.0 * 3.0 * found["distance_from_prior"].sum().item()
     expected = [by_hand, by_hand / 2, by_hand / 4]
     np.testing.assert_allclose(losses, expected, rtol=1e-5)
-
-  @parameterized.parameters("squared_error", "divergence")
-  def test_with_a_filter_it_holds_where_critics_prefer_its_action(self, kind):
-    agent = make_agent(
-      **{"prior.weight": 1.0, "prior.q_filter": True, "prior.distance": kind}
-    )
-    prior = agent.learner.prior
-    inputs = torch.zeros(4, OBS)
-    mean = torch.ones(len(TASKS), 4, A, requires_grad=True)
-    q = torch.zeros(2, len(TASKS), 4)
-    liked = torch.tensor([1.0, -1.0, 1.0, -1.0])  # the sign of large actions
-
-    def values(action):
-      return (liked * action[..., 0]).expand_as(q)
-
-    own = torch.tanh(mean[0, 0, 0]).item()
-    other = torch.tanh(prior._network(inputs)[0][:, 0, 0])
-    self.assertTrue((other < own).all())
-    loss, found = prior(inputs, mean, torch.ones_like(mean), q, values)
-    loss.backward()
-    moves = mean.grad.abs().sum(-1) > 0
-    self.assertEqual(moves.tolist(), [[False, True] * 2] * len(TASKS))
-    self.assertGreater(found["distance_from_prior"].min(), 0.0)
 
   def test_too_high_a_target_entropy_is_reported_by_task(self):
     for std, tasks in ((0.01, list(TASKS)), (1.0, [])):
