@@ -3,9 +3,9 @@
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
 This is `make demo`. It ends, in a new folder under runs/, in a table of success
-on the same resets (untrained agent, its warm start by cloning, trained agent,
-a stored policy trained for longer, the expert), a learning curve, and a video
-whose last clip is of the stored policy.
+on the same resets (untrained agent, multitask BC of the same demonstrations,
+trained agent, a stored policy trained for longer, the expert), a learning
+curve, and a video whose last clip is of the stored policy.
 """
 
 import dataclasses
@@ -38,9 +38,13 @@ _STORED = flags.DEFINE_string(
   "A policy folder to show beside it; default: results/policies/TASK, if it is "
   "there.",
 )
+_BC_UPDATES = flags.DEFINE_integer(
+  "bc_updates", 3000, "Of multitask BC, which is shown beside it.", 1
+)
 _HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.", 32, 4320)
 _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.", 32, 7680)
 _POLICIES = pathlib.Path("results/policies")
+_BC = "multitask_bc"  # its folder in the run's
 _CLIPS = 3  # intentions shown in the video
 _MOST_SECONDS = 8  # of each
 _EVERY = 2  # 50 ms a frame
@@ -63,6 +67,8 @@ def main() -> int:
   figure = training.draw(path)
   if not progress.is_complete:
     print(f"stopped at step {progress.env_step} of {config.env_steps}")
+    return command.INTERRUPTED
+  if not _clone(config, path / _BC):
     return command.INTERRUPTED
   columns = _columns(config, path, stored)
   clip = _film(config, path, columns, stored)
@@ -98,13 +104,37 @@ def table(
   return "\n".join(lines)
 
 
+def _clone(config: RunConfig, path: pathlib.Path) -> bool:
+  """Multitask BC of the demonstrations, by the preset; whether it got done."""
+  from lfgp_dmc.launch import training
+
+  agent = config_flags.config_of(
+    f"--preset={flags.FLAGS.preset}", f"--config.algorithm={_BC}"
+  ).agent
+  updates = _BC_UPDATES.value
+  cloning = dataclasses.replace(
+    config,
+    algorithm=_BC,
+    agent=agent,
+    env_steps=updates,
+    evaluate_every=updates,
+  )
+  print(f"training {_BC} on {config.main_task} in {path}")
+  return training.train(cloning, path).is_complete
+
+
+def _trained(path: pathlib.Path) -> list[EvaluationRow]:
+  """A run's last evaluation."""
+  rows = evaluation_csv.read_csv(path / "evaluation.csv")
+  return evaluation_csv.newest(rows)
+
+
 def _columns(
   config: RunConfig, path: pathlib.Path, stored: policies.PolicySpec | None
 ) -> dict[str, list[EvaluationRow]]:
   """The table's columns: every policy on the same resets."""
   from lfgp_dmc.launch import training
 
-  rows = evaluation_csv.read_csv(path / "evaluation.csv")
   tasks = task_names.task_set(config.main_task)
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
@@ -112,8 +142,8 @@ def _columns(
     untrained = _evaluate(config, "the untrained agent", make, tasks)
   columns = {
     "untrained": untrained,
-    "warm start": [row for row in rows if row.env_step == 0],
-    "trained": evaluation_csv.newest(rows),
+    "BC": _trained(path / _BC),
+    "trained": _trained(path),
   }
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]

@@ -132,33 +132,33 @@ _PIXELS: dict[str, Any] = {
   "agent.reward.masked": "3:6,8:18",
 }
 
-# For 10 to 20 attempts a task: every attempt counts as its images and shifted
-# copies too; discriminators and critics see relative positions, heights and
-# fingers, so that no few rows are recognisable by place; discriminators are
-# sharp: a block 3 cm beside its goal has to be worth another grasp. Each task
-# has networks of its own; critics follow fresh steps, of which there are two an
-# update. The intentions start from cloning, and nothing holds them there.
+# For 3 to 20 attempts a task, from scratch: every attempt counts as its images
+# and shifted copies too; discriminators and critics see relative positions,
+# heights and fingers, so that no few rows are recognisable by place;
+# discriminators are sharp: a block 3 cm beside its goal has to be worth another
+# grasp. Each task has networks of its own; critics follow fresh steps, of which
+# there are two an update. Starts from the clone and priors gain nothing here.
 _FEW: dict[str, Any] = {
   **_FAST,
   "env_steps": 144_000,
   "mirror_demonstrations": True,
+  "random_steps": 1800,
   "shifted_copies": 30,
   "updates_per_step": 0.5,
-  "warm_up": 6000,
   "agent.critic.learning_rate": 0.001,
   "agent.critic.masked": "0:2,3:6,8:14,15:21,22:38,41:44,50:59",
   "agent.critic.polyak": 0.03,
-  "agent.critic.warmup_updates": 4000,
+  "agent.critic.warmup_updates": 0,
   "agent.final_rows": 2,
-  "agent.intention.initial_temperature": 0.001,
+  "agent.intention.initial_temperature": 0.01,
   "agent.intention.learning_rate": 3e-4,
   "agent.intention.target_entropy": -8.0,
   "agent.intention.temperature_learning_rate": 0.0003,
+  "agent.learning_rate": 0.001,  # of BC
   "agent.networks.layout": "separate",
-  "agent.pretraining.learning_rate": 0.001,
-  "agent.pretraining.std": 0.15,
-  "agent.pretraining.updates": 3000,
-  "agent.prior.weight": 0.0,  # where values are flat, it holds the hand still
+  "agent.pretraining.std": 0.0,
+  "agent.pretraining.updates": 0,
+  "agent.prior.weight": 0.0,
   "agent.reward.every": 2,
   "agent.reward.expert_share": 0.5,
   "agent.reward.gradient_penalty": 0.01,
@@ -177,20 +177,13 @@ _FEW_SLOT: dict[str, Any] = {
   "agent.reward.main_masked": "0:6,8:14,15:38,41:47,50:59",
 }
 
-# Half a millimetre decides: from scratch, since intentions unlearn a clone that
-# exact before they gain on it; a delay of one step is worth more than critics
-# err by; long periods; the hand does not count, and the millimetres do.
+# Half a millimetre decides: a delay of one step is worth more than critics err
+# by; long periods; the hand does not count, and the millimetres do.
 _FEW_INSERT: dict[str, Any] = {
-  "random_steps": 1800,
   "shifted_copies": 0,  # it takes thousands of pairs
-  "warm_up": 1800,
   "agent.critic.discount": 0.93,
-  "agent.critic.warmup_updates": 0,
   "agent.inputs.tanh_feature_scale": 0.01,  # m
-  "agent.intention.initial_temperature": 0.01,
   "agent.intention.target_entropy": -12.0,
-  "agent.pretraining.std": 0.0,
-  "agent.pretraining.updates": 0,
   "agent.reward.kind": "discriminator",
   "agent.reward.gradient_penalty": 0.003,
   "agent.reward.main_masked": "0:6,8:14,15:47,50:59",

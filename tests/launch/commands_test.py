@@ -29,14 +29,14 @@ class DemoTest(FolderTest):
       "--config.warm_up=200 --config.agent.scheduler.kind=weighted_random "
       "--config.evaluate_every=360 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.batch_size=8 "
-      "--config.agent.pretraining.updates=5",
+      "--bc_updates=5",
       self.folder,
       fresh=True,
     )
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(
       done.stdout,
-      r"task +untrained +warm start +trained +stored +expert\nopen_gripper",
+      r"task +untrained +BC +trained +stored +expert\nopen_gripper",
     )
     self.assertIn("total time", done.stdout)
     self.assertTrue((self.folder / "runs/demo/learning_curve.png").exists())
