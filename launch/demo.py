@@ -57,20 +57,23 @@ def main() -> int:
   start = time.monotonic()
   with command.checked_input():
     config = config_flags.resolved()
-  path = pathlib.Path(_RUN.value)
-  if not _RUN.value:
-    path = run_folder.default_path("quickstart", config.main_task)
+    path = pathlib.Path(_RUN.value)
+    if not _RUN.value:
+      path = run_folder.default_path("quickstart", config.main_task)
+    runs = {path: config}
+    if config.demonstrations:
+      runs[path / _BC] = _cloning(config)
   stored = _stored_policy(config.main_task)
-  print(f"training {config.algorithm} on {config.main_task} in {path}")
   from lfgp_dmc.launch import training  # loads torch: not for --help
 
-  progress = training.train(config, path)
-  figure = training.draw(path)
-  if not progress.is_complete:
-    print(f"stopped at step {progress.env_step} of {config.env_steps}")
-    return command.INTERRUPTED
-  if not _clone(config, path / _BC):
-    return command.INTERRUPTED
+  figures = []
+  for folder, run in runs.items():
+    print(f"training {run.algorithm} on {run.main_task} in {folder}")
+    progress = training.train(run, folder)
+    figures.append(training.draw(folder))
+    if not progress.is_complete:
+      print(f"stopped at step {progress.env_step} of {run.env_steps}")
+      return command.INTERRUPTED
   columns = _columns(config, path, stored)
   clip = _film(config, path, columns, stored)
   shown = table(config, columns)
@@ -79,7 +82,7 @@ def main() -> int:
   print(f"run folder      {path}")
   print(f"demonstrations  {config.demonstrations}")
   print(f"success table   {path / 'success.txt'}")
-  print(f"learning curve  {figure or 'none'}")
+  print(f"learning curve  {figures[0] or 'none'}")
   print(f"video           {clip or graphics.fault()}")
   print(f"total time      {(time.monotonic() - start) / 60:.1f} minutes")
   return 0
@@ -105,25 +108,23 @@ def table(
   return "\n".join(lines)
 
 
-def _clone(config: RunConfig, path: pathlib.Path) -> bool:
-  """Multitask BC of the demonstrations, by the preset; whether it got done."""
-  from lfgp_dmc.launch import training
-
+def _cloning(config: RunConfig) -> RunConfig:
+  """Multitask BC of the same demonstrations, by the same preset."""
   agent = config_flags.config_of(
     f"--preset={flags.FLAGS.preset}",
     f"--config.algorithm={_BC}",
+    f"--config.main_task={config.main_task}",
     f"--config.agent.networks.hidden_size={_BC_WIDTH}",
   ).agent
-  updates = _BC_UPDATES.value
-  cloning = dataclasses.replace(
+  return dataclasses.replace(
     config,
     algorithm=_BC,
     agent=agent,
-    env_steps=updates,
-    evaluate_every=updates,
+    init_from="",
+    transfer_from="",
+    env_steps=_BC_UPDATES.value,
+    evaluate_every=_BC_UPDATES.value,
   )
-  print(f"training {_BC} on {config.main_task} in {path}")
-  return training.train(cloning, path).is_complete
 
 
 def _trained(path: pathlib.Path) -> list[EvaluationRow]:
@@ -143,11 +144,10 @@ def _columns(
     training.write_untrained_policy(config, pathlib.Path(folder))
     make = functools.partial(policies.stored_policy, folder)
     untrained = _evaluate(config, "the untrained agent", make, tasks)
-  columns = {
-    "untrained": untrained,
-    "BC": _trained(path / _BC),
-    "trained": _trained(path),
-  }
+  columns = {"untrained": untrained}
+  if config.demonstrations:
+    columns["BC"] = _trained(path / _BC)
+  columns["trained"] = _trained(path)
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]
     at_its_rate = _at_rate_of(stored, config)
