@@ -14,20 +14,16 @@ import pathlib
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
-import numpy as np
 from absl import flags
 
-from lfgp_dmc import graphics, seeding, task_names
+from lfgp_dmc import graphics, task_names
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
-from lfgp_dmc.launch import command, config_flags, policies
+from lfgp_dmc.launch import command, config_flags, demo_video, policies
 from lfgp_dmc.launch.configs import RunConfig
-from lfgp_dmc.pictures import recorder, task_switch, video
 from lfgp_dmc.runs import run_folder
-from lfgp_dmc.types import Actor
 
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
@@ -46,10 +42,6 @@ _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.", 32, 7680)
 _POLICIES = pathlib.Path("results/policies")
 _BC = "multitask_bc"  # its folder in the run's
 _BC_WIDTH = 256  # as in the README's table: better than narrower networks
-_CLIPS = 3  # intentions shown in the video
-_MOST_SECONDS = 8  # of each
-_EVERY = 2  # 50 ms a frame
-_RATE = 20.0  # 50 ms a second
 
 
 def main() -> int:
@@ -75,7 +67,14 @@ def main() -> int:
       print(f"stopped at step {progress.env_step} of {run.env_steps}")
       return command.INTERRUPTED
   columns = _columns(config, path, stored)
-  clip = _film(config, path, columns, stored)
+  clip = demo_video.render(
+    config,
+    path,
+    columns["trained"],
+    stored,
+    columns.get("stored", ()),
+    (_HEIGHT.value, _WIDTH.value),
+  )
   shown = table(config, columns)
   (path / "success.txt").write_text(shown + "\n")
   print(f"\n{shown}\n")
@@ -150,7 +149,7 @@ def _columns(
   columns["trained"] = _trained(path)
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]
-    at_its_rate = _at_rate_of(stored, config)
+    at_its_rate = demo_video.at_rate_of(stored, config)
     name = str(stored.folder)
     columns["stored"] = _evaluate(at_its_rate, name, stored.make, able)
   make = functools.partial(policies.scripted_expert, config.control_hz)
@@ -172,11 +171,6 @@ def _stored_policy(main_task: str) -> policies.PolicySpec | None:
   return spec
 
 
-def _at_rate_of(stored: policies.PolicySpec, config: RunConfig) -> RunConfig:
-  rate = stored.environment_spec.control_hz
-  return dataclasses.replace(config, control_hz=rate)
-
-
 def _evaluate(
   config: RunConfig, name: str, make_actor: Callable, tasks: Sequence[str]
 ) -> list[EvaluationRow]:
@@ -189,79 +183,6 @@ def _evaluate(
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
   )
-
-
-def _film(
-  config: RunConfig,
-  path: pathlib.Path,
-  columns: Mapping[str, Sequence[EvaluationRow]],
-  stored: policies.PolicySpec | None,
-) -> pathlib.Path | None:
-  """Renders evaluated episodes again: of the main task, then of others.
-
-  Last comes the stored policy on the main task. Successes are preferred.
-  """
-  if graphics.fault():
-    return None
-  chosen = choose_episodes(config.main_task, columns["trained"])
-  frames = _play(config, policies.stored_policy(str(path)), chosen)
-  shown = [(path.name, row) for row in chosen]
-  if stored is not None:
-    best = choose_episodes(config.main_task, columns["stored"])[:1]
-    frames += _play(_at_rate_of(stored, config), stored.make(), best)
-    shown += [(stored.name, row) for row in best]
-  return video.write(
-    path / "video.mp4",
-    frames,
-    _RATE / _EVERY,
-    {
-      "seed": config.evaluation_seed,
-      "episodes": [
-        {"actor": name, "task": row.task, "episode": row.episode}
-        for name, row in shown
-      ],
-    },
-  )
-
-
-def _play(
-  config: RunConfig, actor: Actor, episodes: Sequence[EvaluationRow]
-) -> list[np.ndarray]:
-  """The frames of evaluated episodes, played again."""
-  environment: Any = config.environment_spec.build()
-  frames: list[np.ndarray] = []
-  for row in episodes:
-    seed = seeding.derive(row.seed, "evaluation", row.episode)
-    environment.reseed(seed)
-    clip = recorder.record(
-      environment,
-      actor,
-      environment.reset(),
-      task_switch.one_task(row.task),
-      seed,
-      recorder.Look(_HEIGHT.value, _WIDTH.value, every=_EVERY),
-      max_steps=_MOST_SECONDS * config.control_hz,
-      until_success_of=row.task,
-    )
-    frames += clip.frames
-  return frames
-
-
-def choose_episodes(
-  main_task: str, rows: Sequence[EvaluationRow]
-) -> list[EvaluationRow]:
-  """One episode of the main task and of a few others, successes if any.
-
-  The gripper tasks come last: there is least to see.
-  """
-  best: dict[str, EvaluationRow] = {}
-  for row in sorted(rows, key=lambda row: not row.success):
-    best.setdefault(row.task, row)
-
-  def rank(row: EvaluationRow) -> tuple:
-    return row.task != main_task, not row.success, "gripper" in row.task
-
-  return sorted(best.values(), key=rank)[:_CLIPS]
 
 
 cli = functools.partial(
