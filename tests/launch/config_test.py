@@ -71,6 +71,19 @@ class ConfigTest(parameterized.TestCase):
       for group in groups & {"reward", "scheduler"}:
         self.assertIn(f"agent.{group}.kind", changes, preset)
 
+  def test_the_flagfile_for_20_hz_means_the_seconds_of_that_for_5(self):
+    slow = config_of("--flagfile=launch/flags/lfgp_few.flags")
+    fast = config_of("--flagfile=launch/flags/lfgp_few_20hz.flags")
+    self.assertEqual((slow.control_hz, fast.control_hz), (5, 20))
+    of_agents = slow.agent, fast.agent
+    xi, more_xi = (agent.scheduler.xi for agent in of_agents)
+    rows, more_rows = (agent.final_rows for agent in of_agents)
+    discount, closer_to_1 = (agent.critic.discount for agent in of_agents)
+    self.assertEqual((more_xi, more_rows), (4 * xi, 4 * rows))
+    self.assertAlmostEqual(closer_to_1**4, discount, places=3)
+    for name in ("warm_up", "random_steps", "checkpoint_every", "log_every"):
+      self.assertEqual(getattr(fast, name), 4 * getattr(slow, name), name)
+
   @parameterized.parameters(*configs.ALGORITHMS)
   def test_comes_back_from_its_json_form(self, algorithm):
     config = config_of(
@@ -203,7 +216,7 @@ class FlagfilesTest(parameterized.TestCase):
     for algorithm in configs.ALGORITHMS:
       config = config_of(f"--flagfile={_FLAGS / algorithm}.flags")
       self.assertEqual(config.algorithm, algorithm)
-    self.assertLessEqual(len(list(_FLAGS.iterdir())), 16)
+    self.assertLessEqual(len(list(_FLAGS.iterdir())), 17)
 
   @parameterized.parameters(
     ("stack", "move_object"),
