@@ -21,6 +21,7 @@ from lfgp_dmc.agents.fields import (
   Slices,
   Switch,
   checked,
+  positions,
 )
 from lfgp_dmc.agents.schedulers.config import AnyScheduler, QTableConfig
 
@@ -45,6 +46,10 @@ class CriticConfig:
   # What critics do not see of an observation, such as 3:6,53:59: of few rows
   # they learn by heart whose return was high.
   masked: Slices = ""
+  # What they see only after so many updates: a float that tells rows apart
+  # whose return is still low keeps what is tried there from being learned.
+  revealed: Slices = ""
+  revealed_after: Count = 0
   value_penalty: NonNegative = 0.0  # lambda, on values out of bounds
   value_penalty_window: PositiveInt = 50  # updates of the bounds' medians
 
@@ -148,20 +153,38 @@ class LfgpConfig:
   @model_validator(mode="after")
   def _check_groups(self):
     """Raises ValueError that lists what does not go together."""
-    faults = [*self._reward_faults()]
+    faults = [*self._reward_faults(), *self._critic_faults()]
     if self.pretraining.updates and self.shares_trunk:
       faults.append(
         "networks.actor_trunk is 'shared'; valid: own, if there are "
         "pretraining.updates (the critics' loss would undo them)"
       )
-    if self.critic.masked and self.shares_trunk:
-      faults.append(
-        f"critic.masked is {self.critic.masked!r}; valid: nothing, if "
-        "networks.actor_trunk is 'shared' (intentions see what critics see)"
-      )
     if faults:
       raise ValueError("\n".join(faults))
     return self
+
+  def _critic_faults(self):
+    critic = self.critic
+    if critic.masked and self.shares_trunk:
+      yield (
+        f"critic.masked is {critic.masked!r}; valid: nothing, if "
+        "networks.actor_trunk is 'shared' (intentions see what critics see)"
+      )
+    if critic.revealed and self.networks.layout != "separate":
+      yield (
+        f"critic.revealed is {critic.revealed!r}; valid: nothing, unless "
+        "networks.layout is 'separate'"
+      )
+    if {*positions(critic.revealed)} & {*positions(critic.masked)}:
+      yield (
+        f"critic.revealed is {critic.revealed!r}; valid: what critic.masked "
+        f"({critic.masked}) leaves"
+      )
+    if bool(critic.revealed) != bool(critic.revealed_after):
+      yield (
+        f"critic.revealed_after is {critic.revealed_after}; valid: a count of "
+        f"updates if critic.revealed ({critic.revealed!r}) is set, else 0"
+      )
 
   def _reward_faults(self):
     reward = self.reward

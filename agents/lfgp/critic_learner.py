@@ -77,6 +77,12 @@ class CriticLearner:
       "q_bound": reward.abs().amax(1) / (1 - config.discount + 1e-8),
     }
 
+  def reveal(self, updates: int) -> None:
+    """Shows critics and targets what they see after so many `updates`."""
+    if self._config.revealed and updates >= self._config.revealed_after:
+      self._networks.critics.reveal()
+      self._networks.target_critics.reveal()
+
   def update_targets(self) -> None:
     """Moves the targets by `polyak` of the way to the critics."""
     target = self._networks.target_critics.flat

@@ -63,6 +63,7 @@ class LfgpLearner:
     trains_intentions = self.updates >= self._warmup_updates
     if self.prior is not None:
       self.prior.fade(self.updates)
+    self.critics.reveal(self.updates)
     if self._recorded is None:
       metrics = self._update(trains_intentions, draw)
     else:

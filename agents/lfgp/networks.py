@@ -76,7 +76,8 @@ def make_networks(
     standardiser.input_size,
     *sizes,
     own.critic_layer_norm,
-    masked_inputs(config.critic.masked, standardiser),
+    inputs_of(config.critic.masked, standardiser),
+    inputs_of(config.critic.revealed, standardiser),
   ).to(device)
   trunk = critics.trunk if config.shares_trunk else None
   intentions = layouts.make_intentions(
@@ -98,7 +99,7 @@ def make_networks(
 
   def make(count: int, masked: str) -> Discriminator:
     sizes = count, standardiser.input_size, actions, own.hidden_size
-    unseen = masked_inputs(masked, standardiser)
+    unseen = inputs_of(masked, standardiser)
     network = Discriminator(*sizes, generator, reward.input, unseen)
     return network.to(device)
 
@@ -112,7 +113,7 @@ def make_networks(
   return networks
 
 
-def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
+def inputs_of(slices: str, standardiser: Standardiser) -> list[int]:
   """Which network inputs stand for slices of an observation, as "3:6,53:59".
 
   Raises:
@@ -122,7 +123,7 @@ def masked_inputs(slices: str, standardiser: Standardiser) -> list[int]:
   chosen = fields.positions(slices)
   if chosen and max(chosen) >= size:
     raise ValueError(
-      f"masked of an observation is {slices}; the observation has {size} floats"
+      f"{slices} is not in an observation; the observation has {size} floats"
     )
   scales = standardiser.input_size // size
   return [scale * size + at for scale in range(scales) for at in chosen]

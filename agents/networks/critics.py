@@ -6,6 +6,7 @@ from torch.nn import functional
 
 from lfgp_dmc.agents.networks.flat import FlatModule, in_products
 from lfgp_dmc.agents.networks.linear import StackedLinear, initialise_
+from lfgp_dmc.agents.networks.trunk import Selection
 
 
 class TwinCriticHeads(nn.Module):
@@ -99,3 +100,9 @@ class CriticNetwork(FlatModule):
   def forward(self, inputs: torch.Tensor, action: torch.Tensor) -> torch.Tensor:
     """Values [2, K, B] of inputs [B, O] and actions [B, A] or [K, B, A]."""
     return self.heads(self.trunk(inputs), action)
+
+  def reveal(self) -> None:
+    """From now on, no input but the masked ones is hidden."""
+    for module in self.modules():
+      if isinstance(module, Selection):
+        module.reveal()

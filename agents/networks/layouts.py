@@ -47,16 +47,24 @@ def make_critics(
   generator: torch.Generator,
   layer_norm: bool = False,
   masked: Sequence[int] = (),
+  revealed: Sequence[int] = (),
 ) -> CriticNetwork:
-  """Draws 2K critics, which do not see the `masked` inputs."""
-  selection = Selection(inputs, masked)
+  """Draws 2K critics, which do not see the `masked` inputs.
+
+  Nor do they see the `revealed` ones until `reveal`; there, in the separate
+  layout, they start from weights of 0.
+  """
+  selection = Selection(inputs, masked, revealed)
   trunk = _make_trunk(layout, selection.size, hidden, generator)
-  if not selection.sees_all:
+  if not selection.sees_all or selection.reveals:
     trunk = nn.Sequential(selection, trunk)
   features, layers = _of_heads(layout, selection.size, hidden)
   heads = TwinCriticHeads(
     tasks, features, hidden, actions, generator, layer_norm, layers
   )
+  if selection.reveals:
+    with torch.no_grad():
+      heads.feature_weight.mul_(selection.shown[:, None])
   return CriticNetwork(trunk, heads)
 
 

@@ -57,21 +57,33 @@ class Standardiser(nn.Module):
 
 
 class Selection(nn.Module):
-  """The inputs of a network that is not to see all of them."""
+  """The inputs of a network that is not to see all of them, or not yet."""
 
-  seen: torch.Tensor
+  seen: torch.Tensor  # int64 [S], places among the inputs
+  shown: torch.Tensor  # [S], 0 until `reveal`, else 1
 
-  def __init__(self, inputs: int, masked: Sequence[int] = ()):
-    """Leaves out the `masked` of so many inputs."""
+  def __init__(
+    self, inputs: int, masked: Sequence[int] = (), revealed: Sequence[int] = ()
+  ):
+    """Leaves out `masked` of so many inputs; `revealed` ones are 0 at first."""
     super().__init__()
     seen = torch.tensor(sorted({*range(inputs)} - {*masked}))
     self.register_buffer("seen", seen, persistent=False)
     self.size = len(seen)
     self.sees_all = self.size == inputs
+    self.reveals = len(revealed) > 0
+    shown = torch.isin(seen, torch.tensor(revealed), invert=True).float()
+    self.register_buffer("shown", shown, persistent=False)
+
+  def reveal(self) -> None:
+    """From now on, all that are not masked are seen."""
+    self.shown.fill_(1)
 
   def forward(self, inputs: torch.Tensor) -> torch.Tensor:
-    """Maps inputs [..., I] to those that are seen."""
-    return inputs if self.sees_all else inputs.index_select(-1, self.seen)
+    """Maps inputs [..., I] to those that are seen, [..., S]."""
+    if not self.sees_all:
+      inputs = inputs.index_select(-1, self.seen)
+    return inputs * self.shown.to(inputs.dtype) if self.reveals else inputs
 
 
 class Trunk(nn.Module):

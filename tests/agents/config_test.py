@@ -52,6 +52,8 @@ class LfgpConfigTest(parameterized.TestCase):
     ("gama", 0.9, "gama"),
     ("pretraining.updates", 10, "own, if there are pretraining.updates"),
     ("critic.masked", "3:6", "nothing, if networks.actor_trunk is 'shared'"),
+    ("critic.revealed", "3:6", "unless networks.layout is 'separate'"),
+    ("critic.revealed_after", 10, "if critic.revealed .* else 0"),
   )
   def test_errors_say_what_is_valid(self, name, value, valid):
     with self.assertRaisesRegex(ValueError, valid):
@@ -61,6 +63,15 @@ class LfgpConfigTest(parameterized.TestCase):
     ("reward.share is 1.0", {"reward.kind": "examples", "reward.share": 1.0}),
     ("expert_share", {"reward.kind": "stored", "reward.expert_share": 0.1}),
     ("phi", {"scheduler.phi": 0.5}),
+    (
+      "what critic.masked .3:6. leaves",
+      {
+        "networks.layout": "separate",
+        "critic.masked": "3:6",
+        "critic.revealed": "5:7",
+        "critic.revealed_after": 10,
+      },
+    ),
     ("(?s)batch_size.*clip|clip.*batch", {"batch_size": 0, "reward.clip": -1}),
   )
   def test_what_does_not_go_together_and_every_fault(self, message, fields):

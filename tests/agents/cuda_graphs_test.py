@@ -116,6 +116,11 @@ class RecordingTest(parameterized.TestCase):
     {"reward.kind": "examples", "critic.value_penalty": 10.0},
     {"networks.layout": "separate", "reward.input": "state"},
     {"reward.main_masked": "0:2"},
+    {
+      "networks.layout": "separate",
+      "critic.revealed": "0:2",
+      "critic.revealed_after": 8,
+    },
   )
   def test_replays_are_the_updates(self, **fields):
     counts = self._compare(12, **fields)

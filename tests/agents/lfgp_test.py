@@ -183,7 +183,7 @@ class BatchTest(absltest.TestCase):
     rewards = agent.learner.reward.rewards(inputs, torch.zeros(3, A)).T
     torch.testing.assert_close(rewards[1], rewards[0])
     self.assertFalse(torch.equal(rewards[2], rewards[0]))
-    with self.assertRaisesRegex(ValueError, "5:7; the observation has 6"):
+    with self.assertRaisesRegex(ValueError, "5:7 .*the observation has 6"):
       make_agent(**{"reward.masked": "5:7"})
 
   def test_critics_do_not_see_masked_floats_and_intentions_do(self):
@@ -200,8 +200,30 @@ class BatchTest(absltest.TestCase):
         self.assertGreater((seen - plain).abs().min(), 0)
       plain, masked, _ = networks.intentions(inputs)[0].unbind(1)
       self.assertGreater((masked - plain).abs().min(), 0)
-    with self.assertRaisesRegex(ValueError, "5:7; the observation has 6"):
+    with self.assertRaisesRegex(ValueError, "5:7 .*the observation has 6"):
       make_agent(**fields, **mask | {"critic.masked": "5:7"})
+
+  def test_critics_see_revealed_floats_only_after_those_updates(self):
+    agent = make_agent(
+      **{
+        "networks.layout": "separate",
+        "inputs.tanh_feature_scale": 0.1,
+        "critic.masked": "3:4",
+        "critic.revealed": "1:3",
+        "critic.revealed_after": 2,
+      }
+    )
+    networks = agent.learner.networks
+    raw = torch.stack([torch.zeros(OBS), torch.eye(OBS)[2]])
+    inputs = networks.intentions.standardiser(raw)
+    for updates in range(4):
+      for critics in (networks.critics, networks.target_critics):
+        plain, revealed = critics(inputs, torch.zeros(2, A)).unbind(-1)
+        if updates <= 2:  # when the third update begins, weights are 0
+          torch.testing.assert_close(revealed, plain, rtol=0, atol=0)
+        else:
+          self.assertGreater((revealed - plain).abs().min(), 0)
+      agent.update()
 
 
 class DeterminismTest(parameterized.TestCase):
@@ -221,6 +243,11 @@ class DeterminismTest(parameterized.TestCase):
     {"prior.weight": 1.0, "prior.decay": 0.9},
     {"reward.main_masked": "0:2"},
     {"critic.masked": "0:2"},
+    {
+      "networks.layout": "separate",
+      "critic.revealed": "0:2",
+      "critic.revealed_after": 3,
+    },
     {"networks.layout": "separate", "critic.value_penalty": 10.0},
     {"threads": 2},
   )
