@@ -178,10 +178,15 @@ _FEW_SLOT: dict[str, Any] = {
 }
 
 # Half a millimetre decides: a delay of one step is worth more than critics err
-# by; long periods; the hand does not count, and the millimetres do.
+# by; long periods; the hand does not count, and the millimetres do. Blue's tilt
+# tells a wedged block from one on its way in: critics that see it from the start
+# learn not to try; half-way, when most tries succeed, it makes them finer.
 _FEW_INSERT: dict[str, Any] = {
   "shifted_copies": 0,  # it takes thousands of pairs
   "agent.critic.discount": 0.93,
+  "agent.critic.masked": "0:2,3:6,8:14,15:16,18:21,22:38,41:44,50:59",
+  "agent.critic.revealed": "16:18",  # x and y of blue's quaternion
+  "agent.critic.revealed_after": 36_000,
   "agent.inputs.tanh_feature_scale": 0.01,  # m
   "agent.intention.target_entropy": -12.0,
   "agent.reward.kind": "discriminator",
