@@ -180,8 +180,9 @@ _FEW_SLOT: dict[str, Any] = {
 # Half a millimetre decides: a delay of one step is worth more than critics err
 # by; long periods; the hand does not count, and the millimetres do. Blue's tilt
 # tells a wedged block from one on its way in: critics that see it from the start
-# learn not to try; half-way, when most tries succeed, it makes them finer.
+# hardly learn the task; later, when most tries succeed, it makes them finer.
 _FEW_INSERT: dict[str, Any] = {
+  "env_steps": 216_000,
   "shifted_copies": 0,  # it takes thousands of pairs
   "agent.critic.discount": 0.93,
   "agent.critic.masked": "0:2,3:6,8:14,15:16,18:21,22:38,41:44,50:59",
