@@ -179,8 +179,9 @@ _FEW_SLOT: dict[str, Any] = {
 
 # Half a millimetre decides: a delay of one step is worth more than critics err
 # by; long periods; the hand does not count, and the millimetres do. Blue's tilt
-# tells a wedged block from one on its way in: critics that see it from the start
-# hardly learn the task; later, when most tries succeed, it makes them finer.
+# tells a wedged block from one on its way in: critics that see it from the
+# start hardly learn the task; later, when most tries succeed, it makes them
+# finer.
 _FEW_INSERT: dict[str, Any] = {
   "env_steps": 216_000,
   "shifted_copies": 0,  # it takes thousands of pairs
