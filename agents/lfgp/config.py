@@ -46,8 +46,8 @@ class CriticConfig:
   # What critics do not see of an observation, such as 3:6,53:59: of few rows
   # they learn by heart whose return was high.
   masked: Slices = ""
-  # What they see only after so many updates: a float that tells rows apart
-  # whose return is still low keeps what is tried there from being learned.
+  # What they see only after so many updates: floats that tell failed tries
+  # apart keep those from being valued before any has succeeded.
   revealed: Slices = ""
   revealed_after: Count = 0
   value_penalty: NonNegative = 0.0  # lambda, on values out of bounds

@@ -122,9 +122,7 @@ def inputs_of(slices: str, standardiser: Standardiser) -> list[int]:
   size = len(standardiser.mean)
   chosen = fields.positions(slices)
   if chosen and max(chosen) >= size:
-    raise ValueError(
-      f"{slices} is not in an observation; the observation has {size} floats"
-    )
+    raise ValueError(f"slices are {slices}; the observation has {size} floats")
   scales = standardiser.input_size // size
   return [scale * size + at for scale in range(scales) for at in chosen]
 
