@@ -81,7 +81,9 @@ class RunConfig:
   # 0: one a core that this process may use. Of two, one trains discriminators
   # while the other trains critics and intentions.
   threads: Processes = 1
-  bfloat16: Switch = False  # products in bfloat16; parameters stay float32
+  # Products in bfloat16, unless the CPU would emulate them; parameters stay
+  # float32.
+  bfloat16: Switch = False
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
   deterministic: Switch = False  # the same numbers again, after a resume too
 

@@ -5,7 +5,6 @@ import signal
 from unittest import mock
 
 import numpy as np
-from absl import logging
 from absl.testing import parameterized
 
 import lfgp_dmc
@@ -40,17 +39,17 @@ class TrainingTest(fixtures.RunTest):
     stored = run_folder.read_config(run)
     self.assertEqual(stored["policy"]["env_step"], 200)
 
-  @parameterized.parameters((False, True), (True, True), (False, False))
-  def test_warns_where_bfloat16_is_emulated(self, has_products, is_asked_for):
-    config = self.config(bfloat16=is_asked_for, env_steps=20)
-    with (
-      mock.patch.object(assemble, "has_bfloat16", lambda: has_products),
-      self.assertLogs() as found,
-    ):
-      logging.info("so that there is a line")
-      self.train(config)
-    is_told = any("--config.bfloat16=False" in line for line in found.output)
-    self.assertEqual(is_told, is_asked_for and not has_products)
+  def test_products_are_in_bfloat16_unless_the_cpu_would_emulate_them(self):
+    def train(name, bfloat16, has_products=True):
+      with mock.patch.object(assemble, "has_bfloat16", lambda: has_products):
+        run, _ = self.train(self.config(bfloat16=bfloat16), name)
+      return fixtures.numbers(run)
+
+    wide = train("float32", False)
+    self.assertNotEqual(train("bfloat16", True), wide)
+    with self.assertLogs(level="WARNING") as found:
+      self.assertEqual(train("emulated", True, has_products=False), wide)
+    self.assertIn("in float32", "\n".join(found.output))
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
