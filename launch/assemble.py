@@ -155,7 +155,7 @@ def make_agent(
     seeding.derive(config.seed, "agent"),
     parts.device,
     *parts.widths,
-    bfloat16=_has_bfloat16(config, parts.device),
+    bfloat16=_uses_bfloat16(config, parts.device),
     threads=config.threads or command.cores(),
     cuda_graphs=config.cuda_graphs,
     frame_shape=parts.frame_shape,
@@ -227,7 +227,7 @@ def _set_up_torch(config: RunConfig) -> torch.device:
       f"config.device is {config.device!r}: {reason}; valid: auto, cpu, or "
       "cuda where this build of torch finds one"
     ) from None
-  if config.bfloat16 and not _has_bfloat16(config, device):
+  if config.bfloat16 and not _uses_bfloat16(config, device):
     logging.warning(
       "config.bfloat16: this CPU would emulate products in bfloat16, many "
       "times slower; they are made in float32"
@@ -235,6 +235,6 @@ def _set_up_torch(config: RunConfig) -> torch.device:
   return device
 
 
-def _has_bfloat16(config: RunConfig, device: torch.device) -> bool:
+def _uses_bfloat16(config: RunConfig, device: torch.device) -> bool:
   """Whether products are asked for in bfloat16 and the processor has them."""
   return config.bfloat16 and (device.type != "cpu" or has_bfloat16())

@@ -5,6 +5,7 @@ import signal
 from unittest import mock
 
 import numpy as np
+from absl import logging
 from absl.testing import parameterized
 
 import lfgp_dmc
@@ -40,16 +41,24 @@ class TrainingTest(fixtures.RunTest):
     self.assertEqual(stored["policy"]["env_step"], 200)
 
   def test_products_are_in_bfloat16_unless_the_cpu_would_emulate_them(self):
-    def train(name, bfloat16, has_products=True):
-      with mock.patch.object(assemble, "has_bfloat16", lambda: has_products):
-        run, _ = self.train(self.config(bfloat16=bfloat16), name)
-      return fixtures.numbers(run)
-
-    wide = train("float32", False)
-    self.assertNotEqual(train("bfloat16", True), wide)
-    with self.assertLogs(level="WARNING") as found:
-      self.assertEqual(train("emulated", True, has_products=False), wide)
-    self.assertIn("in float32", "\n".join(found.output))
+    numbers = {}
+    for asked_for, has_products in (
+      (False, False),
+      (True, False),
+      (True, True),
+    ):
+      with (
+        mock.patch.object(assemble, "has_bfloat16", return_value=has_products),
+        self.assertLogs() as found,
+      ):
+        logging.info("so that there is a line")
+        name = f"{asked_for}_{has_products}"
+        run, _ = self.train(self.config(bfloat16=asked_for), name)
+      is_told = any("config.bfloat16" in line for line in found.output)
+      self.assertEqual(is_told, asked_for and not has_products)
+      numbers[asked_for, has_products] = fixtures.numbers(run)
+    self.assertEqual(numbers[True, False], numbers[False, False])
+    self.assertNotEqual(numbers[True, True], numbers[False, False])
 
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):
     self.check_resume(self.config(), checkpoints=2)
