@@ -99,6 +99,8 @@ class _Worker:
     context = multiprocessing.get_context("spawn")
     self._connection, theirs = context.Pipe()
     self._process = context.Process(target=_serve, args=(make_state, theirs))
+    # Two threads may wait for its end, of which one alone gets its status.
+    self._ending = threading.Lock()
     self._process.start()
     theirs.close()  # so that we read its end
 
@@ -116,11 +118,16 @@ class _Worker:
   def kill(self) -> None:
     """Ends the process, idle or busy."""
     self._process.kill()
-    self._process.join()
+    self._status()
+
+  def _status(self) -> int | None:
+    """Waits for the process's end; returns its exit status."""
+    with self._ending:
+      self._process.join()
+    return self._process.exitcode
 
   def _fate(self) -> str:
-    self._process.join()
-    status = self._process.exitcode
+    status = self._status()
     if status == -signal.SIGKILL:
       return "a worker process was killed, as by the kernel out of memory"
     return f"a worker process ended with exit status {status}"

@@ -3,6 +3,7 @@
 import multiprocessing
 import os
 import signal
+import threading
 import time
 from unittest import mock
 
@@ -61,6 +62,29 @@ class WorkersTest(absltest.TestCase):
     start = time.monotonic()
     results.close()
     self.assertLess(time.monotonic() - start, 2)
+
+  def test_a_worker_is_known_to_have_ended_whoever_else_waits_for_it(self):
+    worker = workers._Worker(_Player)
+    real, has_ended = os.waitpid, threading.Event()
+
+    def wait_and_be_slow(pid, options):
+      found = real(pid, options)
+      if threading.current_thread() is waiting and found[0]:
+        has_ended.set()
+        time.sleep(0.3)  # before it notes the status
+      return found
+
+    def die():
+      with self.assertRaises(workers.LostWorkerError):
+        worker.do("die")
+
+    waiting = threading.Thread(target=die)
+    with mock.patch.object(os, "waitpid", wait_and_be_slow):
+      waiting.start()
+      self.assertTrue(has_ended.wait(60))
+      worker.kill()
+      self.assertEqual(worker._process.exitcode, -signal.SIGKILL)
+      waiting.join()
 
   def test_an_interrupt_leaves_no_process(self):
     def interrupt(number, frame):
