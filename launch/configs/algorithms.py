@@ -52,6 +52,10 @@ ALGORITHMS: dict[str, Algorithm] = {
   "sacx": dataclasses.replace(
     _LFGP,
     defaults={
+      # Masks are for few demonstrations; dense rewards hang on velocities.
+      "agent.critic.masked": "",
+      "agent.critic.revealed": "",
+      "agent.critic.revealed_after": 0,
       "agent.reward.kind": "stored",
       "agent.scheduler.kind": "conditional_weighted",
       "random_steps": 0,

@@ -203,6 +203,13 @@ class ConfigTest(parameterized.TestCase):
     self.assertFalse(config.agent.uses_demonstrations)
     self.assertTrue(config.agent.keeps_rewards)
 
+  @parameterized.parameters(*task_names.MAIN_TASKS)
+  def test_sacx_sees_the_velocities_that_its_rewards_hang_on(self, task):
+    flags = ("--preset=few", f"--config.main_task={task}")
+    critic = config_of("--config.algorithm=sacx", *flags).agent.critic
+    self.assertEqual((critic.masked, critic.revealed), ("", ""))
+    self.assertNotEqual(config_of(*flags).agent.critic.masked, "")
+
 
 class FlagfilesTest(parameterized.TestCase):
   @parameterized.parameters(*_FLAGFILES)
