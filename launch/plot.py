@@ -3,7 +3,7 @@
   python launch/plot.py --run=runs/stack_1
   python launch/plot.py --runs=runs/stack_1,runs/stack_2
   python launch/plot.py --figure=main --runs=runs/paper --output=runs/paper
-  python launch/plot.py --attempts=results/few/attempts.csv
+  python launch/plot.py --attempts=results/few/success.csv
 
 --run shows what one run has logged, also while it trains: success by task,
 rewards, Q, discriminators' accuracies, temperatures. The picture goes into the
