@@ -4,6 +4,7 @@ Importing this loads no simulator; building an environment does.
 """
 
 import functools
+import numbers
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +51,7 @@ def load(
     camera_size: a frame's height and width in pixels, 32 to 480.
     spawn: "published" (starts in the central 15 x 15 cm) or "full_tray".
     control_hz: 20, 10 or 5 control steps a second.
-    time_limit: length of an episode, s.
+    time_limit: length of an episode, s; infinity: it ends at no step.
     show_rewards: whether `reward/<task>`, dense, are observed for all tasks.
     **unknown: refused, with the options that there are.
 
@@ -90,16 +91,16 @@ def _check(given: Mapping[str, Any]) -> None:
       raise ValueError(
         f"unknown {name} {given[name]!r}; valid: {', '.join(map(str, valid))}"
       )
-  if not 32 <= given["camera_size"] <= 480:
-    raise ValueError(
-      f"camera_size is {given['camera_size']!r}; valid: 32 to 480"
-    )
+  size = given["camera_size"]
+  if not isinstance(size, numbers.Integral) or not 32 <= size <= 480:
+    raise ValueError(f"camera_size is {size!r}; valid: 32 to 480")
   if given["observations"] != "features":
     graphics.allow_pictures()
     if fault := graphics.fault():
       raise ValueError(fault)
   time_limit, control_hz = given["time_limit"], given["control_hz"]
-  if not time_limit * control_hz >= 1:
+  is_number = isinstance(time_limit, numbers.Real)
+  if not is_number or not time_limit * control_hz >= 1:
     raise ValueError(
       f"time_limit={time_limit!r}; valid is {1 / control_hz} s or more"
     )

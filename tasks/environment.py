@@ -1,5 +1,6 @@
 """The play world as a dm_env environment: Composer, made fast and seedable."""
 
+import math
 from collections.abc import Callable
 
 import dm_env
@@ -12,6 +13,8 @@ from dm_control.rl import control
 from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.initialisers import Request
 from lfgp_dmc.tasks.play import PlayTask
+
+_LEAST_NORM = 1e-6  # of a quaternion, which MuJoCo normalises
 
 
 class _OncePerStepUpdater(observation.Updater):
@@ -73,7 +76,9 @@ class PlayEnvironment(composer.Environment):
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
     self._steps = 0
     self._reset_next_step: bool
-    self._step_limit = round(time_limit / task.control_timestep)
+    self._step_limit: float = math.inf
+    if math.isfinite(time_limit):
+      self._step_limit = round(time_limit / task.control_timestep)
     self.checks = round(task.control_timestep / ws.CHECK_PERIOD)
     self.on_check: Callable[[], None] | None = None
     self.make: Callable[[], PlayEnvironment] | None = None
@@ -95,6 +100,16 @@ class PlayEnvironment(composer.Environment):
   def __setstate__(self, random_state):
     self._random_state.set_state(random_state)
 
+  def add_extra_hook(self, hook_name: str, hook_callable) -> None:
+    """Composer's, for hooks of a control step.
+
+    Raises:
+      ValueError: a hook of physics steps, which are made many at a time here.
+    """
+    if hook_name.endswith("_substep"):
+      raise ValueError(f"no hook {hook_name!r}; valid: hooks of control steps")
+    super().add_extra_hook(hook_name, hook_callable)
+
   @property
   def needs_reset(self) -> bool:
     """Whether no episode is under way: a step would begin one."""
@@ -110,6 +125,7 @@ class PlayEnvironment(composer.Environment):
   def reset(self) -> dm_env.TimeStep:
     """Starts an episode from the environment's random state."""
     self._steps = 0
+    self._reset_next_step = True  # until it has succeeded
     return super().reset()
 
   def reset_to(
@@ -117,24 +133,29 @@ class PlayEnvironment(composer.Environment):
   ) -> dm_env.TimeStep:
     """Starts an episode at rest in a requested state; None is sampled.
 
+    What is sampled is as fair as at a plain reset: the robot does not touch it,
+    and if neither block is given, no main task is done.
+
     Args:
-      tcp: [3], m, in the robot's base frame.
+      tcp: [3], m, in the robot's base frame; outside the set-point's box
+        (`workspace.py`) the first step pulls it back in.
       blue: [7], x y z in m and quaternion w x y z.
       green: [7], likewise.
       fingers: opening of both, 0 closed to 1 open; held until the first
         gripper command.
 
     Raises:
-      ValueError: a wrong shape, a value that is not finite, an opening
-        outside [0, 1], or a TCP that the arm cannot reach.
+      ValueError: a wrong shape, a value that is not finite, a quaternion of
+        zeros, an opening outside [0, 1], or a TCP that the arm cannot reach.
     """
-    if fingers is not None and not 0.0 <= fingers <= 1.0:
+    opening = _checked("fingers", fingers, ())
+    if opening is not None and not 0.0 <= opening <= 1.0:
       raise ValueError(f"fingers={fingers!r}; valid is 0 (closed) to 1 (open)")
     self._task.request = Request(
-      tcp=_checked("tcp", tcp, 3),
-      blue=_checked("blue", blue, 7),
-      green=_checked("green", green, 7),
-      fingers=fingers,
+      tcp=_checked("tcp", tcp, (3,)),
+      blue=_checked("blue", blue, (7,)),
+      green=_checked("green", green, (7,)),
+      fingers=None if opening is None else float(opening),
     )
     return self.reset()
 
@@ -186,12 +207,17 @@ class PlayEnvironment(composer.Environment):
     )
 
 
-def _checked(name: str, value, size: int) -> np.ndarray | None:
+def _checked(name: str, value, shape: tuple[int, ...]) -> np.ndarray | None:
   if value is None:
     return None
-  value = np.asarray(value, dtype=np.float64)
-  if value.shape != (size,):
-    raise ValueError(f"{name} has shape {value.shape}; valid is ({size},)")
+  try:
+    value = np.asarray(value, dtype=np.float64)
+  except (TypeError, ValueError):
+    raise ValueError(f"{name} is {value!r}; valid: numbers") from None
+  if value.shape != shape:
+    raise ValueError(f"{name} has shape {value.shape}; valid is {shape}")
   if not np.isfinite(value).all():
     raise ValueError(f"{name}={value} holds values that are not finite")
+  if shape == (7,) and np.linalg.norm(value[3:]) < _LEAST_NORM:
+    raise ValueError(f"{name} has the quaternion {value[3:]}; valid: no zeros")
   return value

@@ -114,10 +114,10 @@ class FeatureReader:
     pairs = self._owner[data.contact.geom]
     return set((pairs[:, 0] | pairs[:, 1]).tolist())
 
-  def robot_touches_block(self, physics: mjcf.Physics) -> bool:
-    """Whether any block is in contact with the robot."""
+  def robot_touches(self, physics: mjcf.Physics) -> tuple[bool, bool]:
+    """Whether blue, and whether green, is in contact with the robot."""
     touching = self._touching(physics.data.ptr)
-    return bool(touching & {_ROBOT | _BLUE, _ROBOT | _GREEN})
+    return (_ROBOT | _BLUE) in touching, (_ROBOT | _GREEN) in touching
 
   def features(self, physics: mjcf.Physics) -> np.ndarray:
     """The observation, float32 [59]; call once a control step."""

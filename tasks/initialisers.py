@@ -75,7 +75,7 @@ def _place_arm(physics, panda: Panda, tcp, fingers: float) -> None:
   )
   reached = physics.bind(panda.tcp).xpos
   if not result.success and math.dist(reached, tcp) > 1e-3:
-    raise ValueError(f"the arm cannot reach tcp={tuple(tcp)} pointing down")
+    raise ValueError(f"the arm cannot reach tcp={tcp.tolist()} pointing down")
 
 
 def _sample_tcp(random_state, spawn: str) -> np.ndarray:

@@ -79,22 +79,23 @@ class PlayTask(composer.Task):
     self._publish(physics)
 
   def initialize_episode(self, physics, random_state) -> None:
-    """Starts as requested, or samples a start until it is a fair one.
+    """Starts as requested; samples all else until the start is a fair one.
 
     Raises:
       EpisodeInitializationError: no fair start in many attempts.
       ValueError: the arm cannot reach the requested TCP.
     """
-    request, self.request = self.request, None
+    request = self.request or initialisers.Request()
+    self.request = None
+    given = request.blue is not None, request.green is not None
+    where = self._spawn, self._goal.start, request
     for _ in range(_MOST_ATTEMPTS):
-      wanted = request or initialisers.Request()
-      where = self._spawn, self._goal.start, wanted
       initialisers.place_all(physics, random_state, self.world, *where)
-      if request is None:
+      if not any(given):  # requested blocks stay where they are
         physics.step(_SETTLE_STEPS)
       physics.data.time = 0.0
       self._begin(physics)
-      if request is not None or self._is_fair(physics):
+      if self._is_fair(physics, given):
         return
       physics.reset()
     raise composer.EpisodeInitializationError(
@@ -112,11 +113,16 @@ class PlayTask(composer.Task):
     self._publish(physics)
     self._light_zones(physics)
 
-  def _is_fair(self, physics) -> bool:
-    """No main task is done, and nothing is wedged, toppled or lost."""
-    return (
+  def _is_fair(self, physics, given: tuple[bool, bool]) -> bool:
+    """The robot touches no block but those given.
+
+    If none is given, no main task is done, and nothing is toppled or lost.
+    """
+    touched = self.world.reader.robot_touches(physics)
+    if any(map(operator.gt, touched, given)):
+      return False
+    return any(given) or (
       not any(self._conditions[name] for name in MAIN_TASKS)
-      and not self.world.reader.robot_touches_block(physics)
       and self._goal.start.is_settled(self._snapshot)
     )
 

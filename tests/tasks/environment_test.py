@@ -79,6 +79,20 @@ class EpisodeTest(parameterized.TestCase):
     self.assertEqual(timestep.discount, 1.0)
     self.assertTrue(env.step(KEEP).first())
 
+  def test_without_a_time_limit_no_step_ends_the_episode(self):
+    env = lfgp_dmc.load("reach", seed=0, time_limit=float("inf"), control_hz=5)
+    env.reset()
+    self.assertTrue(fixtures.repeat(env, KEEP, 100).mid())
+
+  def test_hooks_are_called_once_a_control_step_or_refused(self):
+    env, calls = lfgp_dmc.load("reach", seed=0), []
+    env.add_extra_hook("after_step", lambda *_: calls.append(1))
+    env.reset()
+    fixtures.repeat(env, KEEP, 2)
+    self.assertLen(calls, 2)
+    with self.assertRaisesRegex(ValueError, "before_substep"):
+      env.add_extra_hook("before_substep", lambda *_: None)
+
   def test_a_slower_control_rate_moves_as_far_in_a_second(self):
     ends = []
     for rate in (20, 5):
@@ -178,8 +192,41 @@ class StartTest(parameterized.TestCase):
     for green in greens:
       self.assertGreater(np.linalg.norm(green[:2] - blue[:2]), 0.0399)
 
+  @parameterized.parameters({}, {"fingers": 0.5}, {"tcp": (0.0, 0.5, 0.2)})
+  def test_what_reset_to_samples_is_at_rest_and_free_of_the_robot(
+    self, **given
+  ):
+    env = fixtures.fresh("unstack_stack")
+    for _ in range(20):  # one in ten would be touched, one in three by this tcp
+      observed = env.reset_to(**given).observation
+      self.assertFalse(any(env.task.world.reader.robot_touches(env.physics)))
+      self.assertLess(np.abs(observed["block_linear_velocities"]).max(), 0.01)
+      if "tcp" in given:
+        np.testing.assert_allclose(
+          observed["ee_position"], given["tcp"], atol=1e-3
+        )
+
+  def test_a_requested_block_may_lie_in_the_hand(self):
+    env, held = fixtures.fresh(), pose(z=0.2)
+    observed = env.reset_to(tcp=held[:3], blue=held, fingers=0.5).observation
+    self.assertEqual(
+      env.task.world.reader.robot_touches(env.physics), (True, False)
+    )
+    np.testing.assert_allclose(observed["block_positions"][:3], held[:3])
+
+  def test_after_a_refused_reset_the_next_step_begins_an_episode(self):
+    env = fixtures.fresh()
+    env.reset()
+    with self.assertRaisesRegex(ValueError, "cannot reach"):
+      env.reset_to(tcp=(3.0, 0.5, 0.2))
+    self.assertTrue(env.needs_reset)
+    self.assertTrue(env.step(KEEP).first())
+
   @parameterized.parameters(
     ({"tcp": (0.0, 0.5)}, "tcp has shape"),
+    ({"tcp": "here"}, "tcp is 'here'; valid: numbers"),
+    ({"blue": (0.0, 0.5, 0.2, 0.0, 0.0, 0.0, 0.0)}, "blue has the quaternion"),
+    ({"fingers": (1.0, 1.0)}, "fingers has shape"),
     ({"blue": (0.0, 0.5, 0.2)}, "blue has shape"),
     ({"green": (np.nan,) * 7}, "green=.*not finite"),
     ({"fingers": 1.5}, "fingers=1.5; valid is 0"),
@@ -207,6 +254,8 @@ class StartTest(parameterized.TestCase):
     ("stack", {"spawn": "table"}, "published, full_tray"),
     ("stack", {"control_hz": 7}, "20, 10, 5"),
     ("stack", {"time_limit": 0.0}, "time_limit"),
+    ("stack", {"time_limit": "18"}, "time_limit='18'; valid is 0.05 s"),
+    ("stack", {"camera_size": 64.5}, "camera_size is 64.5; valid: 32 to 480"),
     ("stack", {"colour": 1}, "unknown option colour; valid: reward, obs"),
   )
   def test_unknown_names_list_the_valid_ones(self, task, options, message):
