@@ -146,7 +146,8 @@ class PlayEnvironment(composer.Environment):
 
     Raises:
       ValueError: a wrong shape, a value that is not finite, a quaternion of
-        zeros, an opening outside [0, 1], or a TCP that the arm cannot reach.
+        zeros, an opening outside [0, 1], a TCP that the arm cannot reach, or
+        one in the way of every block that could be sampled.
     """
     opening = _checked("fingers", fingers, ())
     if opening is not None and not 0.0 <= opening <= 1.0:

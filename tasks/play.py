@@ -83,10 +83,11 @@ class PlayTask(composer.Task):
 
     Raises:
       EpisodeInitializationError: no fair start in many attempts.
-      ValueError: the arm cannot reach the requested TCP.
+      ValueError: the arm cannot reach the requested TCP, or no fair start has
+        what is requested.
     """
-    request = self.request or initialisers.Request()
-    self.request = None
+    wanted, self.request = self.request, None
+    request = wanted or initialisers.Request()
     given = request.blue is not None, request.green is not None
     where = self._spawn, self._goal.start, request
     for _ in range(_MOST_ATTEMPTS):
@@ -98,9 +99,10 @@ class PlayTask(composer.Task):
       if self._is_fair(physics, given):
         return
       physics.reset()
-    raise composer.EpisodeInitializationError(
-      f"no fair start of {self._goal.name} in {_MOST_ATTEMPTS} attempts"
-    )
+    fault = f"no fair start of {self._goal.name} in {_MOST_ATTEMPTS} attempts"
+    if wanted:  # Composer would try again, without the request
+      raise ValueError(f"{fault} that has what is requested")
+    raise composer.EpisodeInitializationError(fault)
 
   def _begin(self, physics) -> None:
     physics.forward()

@@ -214,6 +214,11 @@ class StartTest(parameterized.TestCase):
     )
     np.testing.assert_allclose(observed["block_positions"][:3], held[:3])
 
+  def test_a_hand_where_the_other_block_must_be_is_refused(self):
+    env = fixtures.fresh("unstack_stack")
+    with self.assertRaisesRegex(ValueError, "no fair start of unstack_stack"):
+      env.reset_to(tcp=(0.0, 0.5, 0.185), blue=pose(), fingers=0.0)
+
   def test_after_a_refused_reset_the_next_step_begins_an_episode(self):
     env = fixtures.fresh()
     env.reset()
