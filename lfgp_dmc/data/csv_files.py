@@ -9,23 +9,38 @@ from typing import Any
 from lfgp_dmc.data import files
 
 STEP_COLUMN = "env_step"
+_LONGEST_LINE = 1 << 16  # bytes
 
 
-def read(path: files.Path) -> tuple[list[str], list[dict[str, str]]]:
-  """Reads columns and rows, as text; a torn last line is left out.
+def read(
+  path: files.Path, is_log: bool = False
+) -> tuple[list[str], list[dict[str, str]]]:
+  """Reads columns and rows, as text.
+
+  Args:
+    path: of the file.
+    is_log: whether a process writes it, which may have been killed: a last line
+      that does not end is left out.
 
   Raises:
-    ValueError: it is no CSV; the message names it.
+    ValueError: it is no CSV, or a line has not as many values as there are
+      columns; the message names it.
   """
   try:
-    text = pathlib.Path(path).read_bytes().decode()
-    # A process that is killed while writing leaves a torn last line.
-    whole = text[: text.rfind("\n") + 1]
-    reader = csv.DictReader(whole.splitlines())
-    columns = list(reader.fieldnames or ())
-    return columns, [row for row in reader if None not in row.values()]
+    text = pathlib.Path(path).read_bytes().decode("utf-8-sig")
+    if is_log:
+      text = text[: text.rfind("\n") + 1]
+    reader = csv.DictReader(text.splitlines())
+    columns, rows = list(reader.fieldnames or ()), []
+    for row in reader:
+      if None in row or None in row.values():
+        raise csv.Error(
+          f"line {reader.line_num} has not {len(columns)} values, one a column"
+        )
+      rows.append(row)
   except (UnicodeDecodeError, csv.Error) as error:
     raise ValueError(f"{path} is no CSV: {error}") from None
+  return columns, rows
 
 
 def write(
@@ -44,7 +59,9 @@ def write(
 def append(
   path: files.Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]
 ) -> None:
-  """Appends rows to a file of the same columns; makes it if it is missing.
+  """Appends rows to a log of the same columns; makes it if it is missing.
+
+  A last line that does not end is cut off first, as `read` leaves it out.
 
   Raises:
     ValueError: the file has other columns.
@@ -57,11 +74,20 @@ def append(
     files.naming(path),
     open(path, "r+", newline="", encoding="utf-8") as file,
   ):
-    found = next(csv.reader(file))
+    found = next(csv.reader([file.readline()]))
     if found != list(columns):
       raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
+    _cut_torn_line(path)
     file.seek(0, os.SEEK_END)
     csv.DictWriter(file, columns, lineterminator="\n").writerows(rows)
+
+
+def _cut_torn_line(path: pathlib.Path) -> None:
+  with open(path, "rb+") as file:
+    start = max(0, file.seek(0, os.SEEK_END) - _LONGEST_LINE)
+    file.seek(start)
+    if end := file.read().rfind(b"\n") + 1:
+      file.truncate(start + end)
 
 
 def truncate_after(path: files.Path, env_step: int) -> None:
@@ -73,7 +99,7 @@ def truncate_after(path: files.Path, env_step: int) -> None:
   path = pathlib.Path(path)
   if not path.exists():
     return
-  columns, rows = read(path)
+  columns, rows = read(path, is_log=True)
   if not columns:
     path.unlink()
     return

@@ -41,7 +41,7 @@ def read_csv(path: files.Path) -> list[EvaluationRow]:
   Raises:
     ValueError: it is not an evaluation's CSV; the message names the file.
   """
-  columns, rows = csv_files.read(path)
+  columns, rows = csv_files.read(path, is_log=True)
   if columns != list(COLUMNS):
     raise ValueError(
       f"{path} is no evaluation: columns {columns}, expected {list(COLUMNS)}"

@@ -18,7 +18,7 @@ class MetricsLog:
     self._path = pathlib.Path(folder) / "metrics.csv"
     self._columns: list[str] = []
     if self._path.exists():
-      self._columns, _ = csv_files.read(self._path)
+      self._columns, _ = csv_files.read(self._path, is_log=True)
     self._events = event_file_writer.EventFileWriter(
       str(self._path.parent / "tensorboard")
     )

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import operator
 import pathlib
 from collections import defaultdict
 from typing import Any, NamedTuple
@@ -95,13 +96,15 @@ def _logged(path: pathlib.Path) -> dict[str, Curves]:
   logged: dict[str, Curves] = defaultdict(lambda: defaultdict(list))
   evaluation, metrics = path / "evaluation.csv", path / "metrics.csv"
   if evaluation.is_file():
-    rows = evaluation_csv.read_csv(evaluation)
-    for step, group in itertools.groupby(rows, lambda row: row.env_step):
+    at_step = operator.attrgetter("env_step")  # later commands append rows
+    rows = sorted(evaluation_csv.read_csv(evaluation), key=at_step)
+    for step, group in itertools.groupby(rows, at_step):
       for task, rate in evaluation_csv.success_rates(list(group)).items():
         if math.isfinite(rate):
           logged["success"][task].append((step, rate))
   try:
-    for row in csv_files.read(metrics)[1] if metrics.is_file() else ():
+    read = csv_files.read(metrics, is_log=True)[1] if metrics.is_file() else ()
+    for row in read:
       step = int(row[csv_files.STEP_COLUMN])
       for column, text in row.items():
         quantity, _, task = column.partition("/")

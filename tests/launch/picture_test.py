@@ -2,8 +2,10 @@
 
 from unittest import mock
 
+import numpy as np
 from absl.testing import parameterized
 
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import training
 from lfgp_dmc.study import drawing, run_picture
 from tests.launch import fixtures
@@ -49,6 +51,17 @@ class PictureTest(fixtures.RunTest):
     for axes in save.call_args.args[0].axes:
       last = 60 if axes.get_title().startswith("success") else 40
       self.assertEqual(axes.lines[0].get_xdata()[-1], last)
+
+  def test_what_is_evaluated_later_stands_at_its_step(self):
+    run, _ = self.train(self.config(env_steps=60, evaluate_first=True))
+    path = run / "evaluation.csv"
+    rows = evaluation_csv.read_csv(path)
+    again = [row._replace(seed=9) for row in rows if not row.env_step]
+    evaluation_csv.append_csv(path, again)
+    with mock.patch.object(drawing, "save") as save:
+      run_picture.draw(run, run / "a.png")
+    (line, *_) = save.call_args.args[0].axes[0].lines
+    np.testing.assert_array_equal(line.get_xdata(), [0, 60])
 
   def test_training_does_not_fail_with_its_picture(self):
     run, _ = self.train(self.config(env_steps=60))

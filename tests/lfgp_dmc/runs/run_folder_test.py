@@ -87,6 +87,25 @@ class MetricsLogTest(fixtures.FolderTest):
     self.assertEqual((scalar.step, scalar.value), (500, 1.5))
     self.assertEqual(events.Scalars("success/reach")[0].step, 600)
 
+  def test_rows_are_appended_in_place_of_a_torn_one(self):
+    path = self.folder / "a.csv"
+    path.write_text("env_step,x\n1,2\n2,")
+    csv_files.append(path, ["env_step", "x"], [{"env_step": 3, "x": 4}])
+    self.assertEqual(path.read_text(), "env_step,x\n1,2\n3,4\n")
+
+  def test_of_what_no_process_writes_every_line_counts(self):
+    path = self.folder / "a.csv"
+    path.write_bytes("\ufeffname,x\na,1\nb,2".encode())
+    columns, rows = csv_files.read(path)
+    self.assertEqual(columns, ["name", "x"])
+    self.assertEqual([row["name"] for row in rows], ["a", "b"])
+    for line in ("c", "c,3,4"):
+      path.write_text(f"name,x\na,1\n{line}\n")
+      with self.assertRaisesRegex(
+        ValueError, "a.csv is no CSV: line 3 has not"
+      ):
+        csv_files.read(path)
+
   def test_other_columns_are_not_appended(self):
     path = self.folder / "a.csv"
     csv_files.append(path, ["env_step", "x"], [{"env_step": 1, "x": 2}])
