@@ -18,7 +18,7 @@ from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
-from lfgp_dmc.runs import checkpoints, run_folder
+from lfgp_dmc.runs import checkpoints, metrics, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
@@ -55,8 +55,9 @@ def _train(
   sha256 = config.demonstrations_sha256
   if resume:
     with command.checked_input():
-      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
       stored = run_folder.read_config(path)
+      _check_continues(config, RunFolder(path), stored)
+      folder = run_folder.resume(path, config.to_dict(), _with_newer_fields)
     sha256 = stored.get("demonstrations_sha256", "")  # none in older runs
   parts = assemble.make_parts(config, path if resume else None)
   if found := parts.demonstrations:
@@ -90,6 +91,23 @@ def _train(
     if is_input:
       raise UserError(str(error)) from error
     raise
+
+
+def _check_continues(
+  config: RunConfig, folder: RunFolder, stored: dict[str, Any]
+) -> None:
+  """Raises UserError if starting anew would overwrite what was learned.
+
+  A run that was killed before its first checkpoint has learned little.
+  """
+  step = stored.get(run_folder.POLICY_FIELD, {}).get("env_step", 0)
+  first = config.checkpoint_every + config.most_episode_steps
+  is_young = step < first and (folder.path / metrics.NAME).exists()
+  if step and not is_young and not checkpoints.every(folder.checkpoints):
+    raise UserError(
+      f"{folder.path} has a policy of step {step}, but no checkpoint to go on "
+      f"from; a new run may start from it: --config.init_from={folder.path}"
+    )
 
 
 def _sha256(found: dict[str, Demonstrations]) -> str:

@@ -91,8 +91,7 @@ class Run:
     path = checkpoints.latest(folder.checkpoints)
     if path is None and checkpoints.every(folder.checkpoints):
       raise checkpoints.CheckpointError(
-        f"every checkpoint in {folder.checkpoints} is damaged; without that "
-        "folder --resume starts the run anew"
+        f"every checkpoint in {folder.checkpoints} is damaged"
       )
     replay_total, last_step = 0, -1
     if path is None:

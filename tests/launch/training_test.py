@@ -99,6 +99,19 @@ class TrainingTest(fixtures.RunTest):
     self.train(config, "stopped", resume=True)
     self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
+  def test_a_policy_without_checkpoints_is_not_started_anew(self):
+    path, _ = self.train(self.config())
+    shutil.rmtree(path / "checkpoints")
+    for lost in ("run.lock", "metrics.csv"):  # of a run, then a policy folder
+      (path / lost).unlink()
+      kept = {file: file.read_bytes() for file in path.glob("*.*")}
+      with self.assertRaisesRegex(
+        UserError, "policy of step 200, but no checkpoint.*init_from=.*runs/a"
+      ):
+        self.train(self.config(), resume=True)
+      found = {file: file.read_bytes() for file in path.glob("*.*")}
+      self.assertEqual(found, kept)
+
   def test_another_config_is_not_resumed(self):
     self.train(self.config(env_steps=40))
     changed = {"agent.scheduler.xi": 10, "env_steps": 40, "seed": 4}
