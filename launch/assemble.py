@@ -57,7 +57,9 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   """
   device = _set_up_torch(config)
   with command.checked_input():
-    environment = config.environment_spec.build(config.agent.keeps_rewards)
+    environment = config.environment_spec.build(
+      config.agent.keeps_rewards, seeding.derive(config.seed, "environment")
+    )
     tasks = tasks_of(config, environment)
     shape = environments.frame_shape(environment)
     widths = environments.widths(environment)
@@ -178,7 +180,7 @@ def make_run(
     config.evaluation_seed,
     config.evaluation_workers or command.cores(),
     progress_bar,
-    draws=bool(config.camera_size),
+    draws=config.environment_spec.may_draw,
   )
   return Run(
     folder,

@@ -53,6 +53,11 @@ class EnvironmentSpec:
       **seen,
     )
 
+  @property
+  def may_draw(self) -> bool:
+    """Whether its observations may hold frames."""
+    return bool(self.camera_size or self.environment)
+
   def check(self) -> None:
     """Raises ValueError if `build` would not find what it needs."""
     for name in ("main_task", "environment"):
@@ -73,6 +78,7 @@ def _imported(path: str) -> Callable[..., dm_env.Environment]:
   if "" not in sys.path and os.getcwd() not in sys.path:
     sys.path.append(os.getcwd())
   module, _, name = path.partition(":")
+  graphics.allow_pictures()  # there may be cameras
   try:
     make = getattr(importlib.import_module(module), name)
     signature = inspect.signature(make)

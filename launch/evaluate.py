@@ -72,7 +72,7 @@ def main() -> None:
       seed,
       _WORKERS.value or command.cores(),
       env_step=spec.env_step,
-      draws=bool(spec.environment_spec.camera_size),
+      draws=spec.environment_spec.may_draw,
     )
     if _CHECKPOINTS.value:
       print(f"after {spec.env_step} environment steps, resets of seed {seed}:")

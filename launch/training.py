@@ -163,8 +163,31 @@ def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
   if config.transfer_from:
     _transfer(config, agent, replay)
   if config.init_from:
-    agent.start_from(Policy.load(config.init_from))
+    policy = Policy.load(config.init_from)
+    _check_source(config, config.init_from, "init_from")
+    agent.start_from(policy)
     print(f"the intentions start as those of {config.init_from}")
+
+
+def _check_source(config: RunConfig, path: files.Path, field: str) -> None:
+  """Raises ValueError if what is taken over means other steps or inputs.
+
+  Sizes of arrays do not tell.
+  """
+  stored = run_folder.read_config(path)
+  rate = stored.get("control_hz", config.control_hz)
+  if rate != config.control_hz:
+    raise ValueError(
+      f"config.control_hz is {config.control_hz}; {field} {path} has {rate}"
+    )
+  own = config.agent.inputs.tanh_feature_scale
+  options = stored.get(run_folder.POLICY_FIELD, {})
+  scale = options.get("tanh_feature_scale", own)
+  if scale != own:
+    raise ValueError(
+      f"config.agent.inputs.tanh_feature_scale is {own}; {field} {path} has "
+      f"{scale}"
+    )
 
 
 def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
@@ -172,6 +195,7 @@ def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
   source = RunFolder(pathlib.Path(config.transfer_from))
   try:
     tasks = run_folder.read_config(source.path)["policy"]["tasks"]
+    _check_source(config, source.path, "transfer_from")
     path = checkpoints.latest(source.checkpoints)
     if path is None:
       raise ValueError(f"{source.path} has no good checkpoint yet")

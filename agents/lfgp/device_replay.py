@@ -37,16 +37,23 @@ class DeviceReplay:
     """Copies what was added, and anew what was withdrawn and replaced."""
     replay = self._replay
     self._make_room(min(replay.total, replay.capacity))
+    mark = min(self._copied, replay.take_low_mark())
+    # Rows that those withdrawn had displaced are there again.
+    self._copy(mark - replay.capacity, self._copied - replay.capacity)
+    self._copy(mark, replay.total)
+    self._copied = replay.total
+
+  def _copy(self, start: int, stop: int) -> None:
+    """Copies the rows of these numbers that can be sampled."""
+    replay = self._replay
     oldest = replay.total - len(replay)
-    start = max(oldest, min(self._copied, replay.take_low_mark()))
-    for first in range(start, replay.total, _CHUNK):
-      numbers = np.arange(first, min(first + _CHUNK, replay.total))
+    for first in range(max(start, oldest), stop, _CHUNK):
+      numbers = np.arange(first, min(first + _CHUNK, stop))
       rows = torch.from_numpy(numbers % replay.capacity)
       fresh = replay.gather(numbers - oldest)
       for column, values in zip(self._columns, fresh, strict=True):
         rows = rows.to(column.device)
         column[rows] = torch.from_numpy(values).to(column.device)
-    self._copied = replay.total
 
   def _make_room(self, rows: int) -> None:
     """Doubles the memory when it is full; one column at a time is copied."""

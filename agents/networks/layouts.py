@@ -16,7 +16,7 @@ from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionHeads, IntentionNetwork
 from lfgp_dmc.agents.networks.trunk import Selection, Standardiser, Trunk
 
-SHARED_TRUNK, SEPARATE = "shared_trunk", "separate"
+SEPARATE = "separate"
 
 
 def make_intentions(
@@ -66,11 +66,6 @@ def make_critics(
     with torch.no_grad():
       heads.feature_weight.mul_(selection.shown[:, None])
   return CriticNetwork(trunk, heads)
-
-
-def layout_of(heads: IntentionHeads) -> str:
-  """The layout that `make_intentions` made these heads for."""
-  return SHARED_TRUNK if heads.second is None else SEPARATE
 
 
 def _make_trunk(

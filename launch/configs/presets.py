@@ -31,7 +31,6 @@ _RAL: dict[str, Any] = {
 _VPACE: dict[str, Any] = {
   "control_hz": 5,
   "env_steps": 500_000,
-  "episode_steps": 96,
   "evaluate_every": 25_000,
   "random_steps": 10_000,
   "warm_up": 5000,

@@ -49,7 +49,8 @@ class RunConfig:
   control_hz: PositiveInt = 20  # of the block tasks: 20, 10 or 5 steps a second
   # From pixels: the side of the block tasks' frames; 0: from the 59 floats.
   camera_size: Count = 0
-  episode_steps: Count = 0  # at most; 0: 18 s
+  # Of another environment, which decides them; the block tasks': 18 s.
+  episode_steps: Count = 0
 
   # Acting and updates; not of behaviour cloning.
   warm_up: PositiveInt = 1000  # transitions before the first update
@@ -103,6 +104,11 @@ class RunConfig:
         f"environment is {self.environment!r}; valid: nothing (the block "
         "tasks) or package.module:factory"
       )
+    if self.episode_steps and not self.environment:
+      yield (
+        f"episode_steps is {self.episode_steps}; valid: 0 without environment "
+        f"(the block tasks' last {EPISODE_SECONDS} s)"
+      )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
     for name, why in (
@@ -117,17 +123,21 @@ class RunConfig:
         )
       if self.camera_size and value:
         yield f"{valid} camera_size ({why})"
+    if self.warm_up > self.replay_capacity and not self.transfer_from:
+      yield (
+        f"warm_up is {self.warm_up}; valid: at most replay_capacity, "
+        f"{self.replay_capacity}"
+      )
     if self.attempts_per_task and self.pairs_per_task:
       yield (
         f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
         f"pairs_per_task={self.pairs_per_task}"
       )
-    if self.collect_missing and not (
-      self.attempts_per_task or self.pairs_per_task
-    ):
+    is_counted = self.attempts_per_task or self.pairs_per_task
+    if self.collect_missing and (self.environment or not is_counted):
       yield (
         "collect_missing is True; valid: False without pairs_per_task or "
-        "attempts_per_task"
+        "attempts_per_task, or with environment"
       )
     if self.camera_size and self.transfer_from:
       yield (
@@ -137,6 +147,18 @@ class RunConfig:
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"
+    agent = self.agent
+    if (
+      isinstance(agent, LfgpConfig)
+      and agent.prior.weight
+      and not (agent.pretraining.updates or self.init_from)
+      and not self.camera_size  # which needs init_from anyway
+    ):
+      yield (
+        f"agent.prior.weight is {agent.prior.weight}; valid: 0 without "
+        "agent.pretraining.updates or init_from (the intentions would be held "
+        "at random ones)"
+      )
     if not self.init_from:
       return
     valid = f"init_from is {self.init_from!r}; valid: nothing"

@@ -50,6 +50,14 @@ class DeviceReplayTest(absltest.TestCase):
     self._add(5)
     self._check()
 
+  def test_rows_that_return_to_a_full_ring_return_here(self):
+    self._add(70)
+    self._check()
+    self.replay.withdraw(8)
+    self._check()
+    self._add(3)
+    self._check()
+
   def test_starts_from_a_replay_that_is_full(self):
     self._add(70)
     self.rows = DeviceReplay(self.replay, torch.device("cpu"))

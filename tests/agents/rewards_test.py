@@ -124,6 +124,12 @@ class ExamplesTest(absltest.TestCase):
     examples = draw.batch.inputs[32:]
     torch.testing.assert_close(draw.batch.next_inputs[32:], examples)
 
+  def test_a_batch_without_examples_of_some_task_is_refused(self):
+    with self.assertRaisesRegex(
+      ValueError, "batch_size is 4; valid: more, .* are 2 examples of 3 tasks"
+    ):
+      make_agent(**_EXAMPLES, batch_size=4)
+
   def test_noise_is_in_the_tasks_own_stds(self):
     generator = np.random.default_rng(0)
     batch = with_examples(

@@ -7,6 +7,7 @@ import numpy as np
 from lfgp_dmc import task_names, toy
 from lfgp_dmc.acting import environments
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.data import files
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, configs
 from lfgp_dmc.launch.command import UserError
@@ -217,12 +218,28 @@ class InitFromTest(_RunTest):
     expected = Policy.load(source).act(rows, "left")
     np.testing.assert_array_equal(acts, [expected])
     self.train(config, "a", resume=True)  # was killed at once: starts again
+    files.write_json(
+      bare / "config.json",
+      files.read_json(bare / "config.json") | {"control_hz": 5},
+    )
+    with self.assertRaisesRegex(UserError, "control_hz is 20; init_from .* 5"):
+      self.train(config, "b")
     wrong = self.config(
       init_from=str(self.folder / "data"),
       **{"agent.networks.actor_trunk": "own"},
     )
     with self.assertRaisesRegex(UserError, "no policy in .*data"):
       self.train(wrong, "b")
+
+  def test_inputs_of_another_scale_are_refused(self):
+    scale = "agent.inputs.tanh_feature_scale"
+    source, _ = self.train(self.config(env_steps=20, **{scale: 0.1}), "source")
+    config = self.config(
+      init_from=str(source),
+      **{scale: 0.2, "agent.networks.actor_trunk": "own"},
+    )
+    with self.assertRaisesRegex(UserError, f"{scale} is 0.2; init_from .* 0.1"):
+      self.train(config)
 
 
 class ExamplesTest(_RunTest):
