@@ -131,6 +131,12 @@ def _plan() -> CollectionPlan:
       f"--control_hz={_HERTZ.value}: --expert={_EXPERT.value} acts at "
       f"{spec.environment_spec.control_hz} Hz"
     )
+  seen = spec.environment_spec.camera_size
+  if seen not in (0, _CAMERA.value):
+    raise command.UserError(
+      f"--camera_size={_CAMERA.value}: --expert={_EXPERT.value} sees frames of "
+      f"{seen}"
+    )
   lacking = [task for task in tasks if task not in spec.tasks]
   if lacking:
     raise command.UserError(
@@ -141,8 +147,8 @@ def _plan() -> CollectionPlan:
   shape: tuple[int, ...] = ()
   if _CAMERA.value:
     # A policy from pixels is to see no more; other experts need the state.
-    seen = "vision" if spec.environment_spec.camera_size else "all"
-    options |= {"observations": seen, "camera_size": _CAMERA.value}
+    shown = "vision" if seen else "all"
+    options |= {"observations": shown, "camera_size": _CAMERA.value}
     with command.checked_input():
       shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
   return CollectionPlan(

@@ -47,7 +47,7 @@ def load(
       found = demonstrations.read_folder(folder, tasks, *widths, frame_shape)
     _check_rate(config, found)
   except ValueError as error:
-    hint = "" if folder.exists() else f"\ncollect it: {_command(config)}"
+    hint = "" if folder.exists() else _hint(config)
     raise UserError(f"{error}{hint}") from None
   found = _counted(config, found)
   if config.mirror_demonstrations:
@@ -116,6 +116,18 @@ def _collect(config: RunConfig) -> None:
     raise UserError(f"{config.demonstrations} could not be collected")
 
 
+def _hint(config: RunConfig) -> str:
+  """How the dataset comes about, as far as the config tells."""
+  if config.environment:
+    return ""
+  if config.attempts_per_task or config.pairs_per_task:
+    return f"\ncollect it: {_command(config)}"
+  return (
+    "\ncollect it by launch/collect_demonstrations.py; the head of a flagfile "
+    "says how"
+  )
+
+
 def _command(config: RunConfig) -> str:
   """To be typed into a shell."""
   script = ("python", "launch/collect_demonstrations.py")
@@ -127,7 +139,7 @@ def _flags(config: RunConfig) -> list[str]:
   flags = {
     "task": config.main_task,
     "tasks": config.main_task,
-    unit: getattr(config, unit) or "...",
+    unit: getattr(config, unit),
     "seed": config.seed,
     "control_hz": config.control_hz,
     "camera_size": config.camera_size,

@@ -72,7 +72,8 @@ def main() -> int:
   """Runs what is not done; the exit status is 0 if all is."""
   runs = pathlib.Path(_RUNS.value)
   jobs = _jobs(runs)
-  sweep_jobs.recall(jobs, runs / sweep_jobs.INDEX_NAME)
+  with command.checked_input():
+    sweep_jobs.recall(jobs, runs / sweep_jobs.INDEX_NAME)
   if _DRY_RUN.value:
     for job in jobs:
       arguments = shlex.join(job.train_arguments())

@@ -19,6 +19,9 @@ INDEX_NAME = "index.csv"
 COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
            "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
 
+_STEPS = "--config.env_steps="
+_ENDLESS = 1 << 62
+
 # States, in the life of a run.
 WAITING, RUNNING, DONE = "waiting", "running", "done"
 FAILED, STOPPED, MISSING = "failed", "stopped", "no flagfile"
@@ -47,6 +50,12 @@ class Job:
     return self.folder.name
 
   @property
+  def steps(self) -> int:
+    """How long its arguments let it be; 0: they do not say."""
+    given = [a.removeprefix(_STEPS) for a in self.arguments if _STEPS in a]
+    return int(given[-1]) if given and given[-1].isdecimal() else 0
+
+  @property
   def log(self) -> pathlib.Path:
     """What the run prints, all attempts in one file."""
     return self.folder.with_name(f"{self.name}.log")
@@ -54,7 +63,7 @@ class Job:
   def train_arguments(self) -> list[str]:
     """Of `launch/train.py`: from the beginning, or on from a checkpoint."""
     if (self.folder / run_folder.CONFIG_NAME).exists():
-      return [f"--run={self.folder}", "--resume"]
+      return [f"--run={self.folder}", "--resume", *self.arguments]
     return [
       f"--flagfile={self.flagfile}",
       f"--config.main_task={self.main_task}",
@@ -153,14 +162,19 @@ def recall(jobs: Sequence[Job], index: pathlib.Path) -> None:
   """Takes over what an earlier sweep knew, and finds what is done."""
   earlier = {}
   if index.is_file():
-    earlier = {row["name"]: row for row in csv_files.read(index)[1]}
+    columns, rows = csv_files.read(index)
+    if columns != list(COLUMNS):
+      raise ValueError(f"{index} is no sweep's: its columns are {columns}")
+    earlier = {row["name"]: row for row in rows}
   for job in jobs:
     row = earlier.get(job.name)
-    if row is not None and row.get("wall_s"):
+    if row is not None and row["wall_s"]:
       job.wall_s = float(row["wall_s"])
     was_done = row is not None and row["state"] == DONE
     is_there = (job.folder / run_folder.CONFIG_NAME).is_file()
-    if is_there and (was_done or _is_done(job.folder)):
+    if not is_there or job.steps > _steps_of(job.folder):
+      continue
+    if was_done or _is_done(job.folder):
       job.state = DONE
 
 
@@ -180,14 +194,18 @@ def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
   csv_files.write(index, COLUMNS, rows)
 
 
+def _steps_of(folder: pathlib.Path) -> int:
+  """How long a run's own config lets it be."""
+  try:
+    return int(run_folder.read_config(folder).get("env_steps", _ENDLESS))
+  except ValueError:
+    return _ENDLESS
+
+
 def _is_done(folder: pathlib.Path) -> bool:
   """Whether a run was evaluated at its last step; says nothing of BC."""
-  try:
-    config = run_folder.read_config(folder)
-    step = _last_success(folder)[0]
-  except ValueError:
-    return False
-  return step != "" and int(step) >= int(config.get("env_steps", 1 << 62))
+  step = _last_success(folder)[0]
+  return step != "" and int(step) >= _steps_of(folder)
 
 
 def _last_success(folder: pathlib.Path) -> tuple[str, str]:

@@ -104,7 +104,7 @@ def small_config(dataset: pathlib.Path, **changes) -> configs.RunConfig:
     "deterministic": True,
     "device": "cpu",
     "env_steps": 200,
-    "episode_steps": 20,
+    "episode_steps": 20 if changes.get("environment", POINT) else 0,
     "environment": POINT,
     "evaluate_every": 100,
     "evaluation_episodes": 2,

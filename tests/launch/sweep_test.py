@@ -158,5 +158,15 @@ class SweepTest(FolderTest):
     )
     self.assertEqual(again[2].wall_s, 60)
     self.assertIn("--resume", again[0].train_arguments())
+    longer = self._jobs(("lfgp",), (0, 1), arguments=["--config.env_steps=101"])
+    sweep_jobs.recall(longer, index)
+    self.assertEqual({job.state for job in longer}, {"waiting"})
+    self.assertEqual(
+      longer[1].train_arguments(),
+      [f"--run={longer[1].folder}", "--resume", "--config.env_steps=101"],
+    )
     row = csv_files.read(index)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
+    index.write_text("question,verdict\nwhy,so\n")
+    with self.assertRaisesRegex(ValueError, "index.csv is no sweep's"):
+      sweep_jobs.recall(again, index)
