@@ -109,7 +109,7 @@ def _measurements(config: configs.RunConfig) -> Iterator[tuple]:
   arguments: dict[str, tuple] = {
     "bars": (steps, seconds),
     "presets": (seconds,),
-    "environment": (steps, seed),
+    "environment": (config, steps, seed),
     "learner": (config, seconds),
     "training": (config, steps, seconds),
     "acting": (config, steps),

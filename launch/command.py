@@ -70,6 +70,8 @@ def run(
       return flags.FLAGS([argv[0], *arguments])
     except (flags.Error, ValueError) as error:
       sys.exit(_fail(str(error)))
+    except BrokenPipeError:
+      sys.exit(_close_output())
 
   app.run(guarded_main, flags_parser=parse)
 
@@ -100,8 +102,8 @@ def guarded(main: Callable[[], int | None]) -> int | None:
     return main()
   except UserError as error:
     return _fail(str(error))
-  except BrokenPipeError:  # such as `| head`
-    return 1
+  except BrokenPipeError:
+    return _close_output()
   except OSError as error:
     return _fail(str(error))
   except LostWorkerError as error:
@@ -144,6 +146,12 @@ def _is_relevant(record: logging.LogRecord) -> bool:
   """Filters import-time log noise of libraries."""
   is_theirs = any(name in record.pathname for name in ("dm_control", "OpenGL"))
   return not is_theirs or record.levelno >= logging.WARNING
+
+
+def _close_output() -> int:
+  """After `| head`: what is left to print would fail again at the exit."""
+  os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+  return 1
 
 
 def _fail(message: str) -> int:

@@ -13,7 +13,7 @@ import dm_env
 import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
-from lfgp_dmc.task_names import check_task
+from lfgp_dmc.task_names import CONTROL_RATES, check_task
 
 _FIELD = "config.environment"
 
@@ -67,6 +67,11 @@ class EnvironmentSpec:
       _imported(self.environment)
     else:
       check_task(self.main_task)
+      if self.control_hz not in CONTROL_RATES:
+        rates = ", ".join(map(str, CONTROL_RATES))
+        raise ValueError(
+          f"config.control_hz is {self.control_hz!r}; valid: {rates}"
+        )
     if self.camera_size:
       graphics.allow_pictures()
       if fault := graphics.fault():

@@ -59,6 +59,9 @@ _OUTPUT = flags.DEFINE_string(
 def main() -> None:
   """Plays, prints the table, and writes the rows."""
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
+  for flag in (_HERTZ, _MAIN_TASK):
+    if flag.present and not _EXPERT.value:
+      raise UserError(f"--{flag.name} goes with --expert")
   output = _output()
   if output is not None:
     _known(output)  # better refused now than after all episodes

@@ -95,6 +95,11 @@ def find(
       config.get("camera_size", 0),
     )
     spec.check()
+    if main_task not in policy.tasks:
+      raise ValueError(
+        f"config.main_task is {main_task!r}; the policy in {path} has: "
+        f"{', '.join(policy.tasks)}"
+      )
   except (ValueError, OSError) as error:
     raise UserError(str(error)) from None
   return PolicySpec(

@@ -84,6 +84,12 @@ def main() -> None:
   command.check_choice("control_hz", _HERTZ.value, CONTROL_RATES)
   if _COLLECTION.value == "play" and not _EXPERT.value:
     raise UserError("--collection=play needs --expert=scripted")
+  if _HERTZ.present and not _EXPERT.value:
+    raise UserError("--control_hz goes with --expert=scripted")
+  if _WHAT.value == "strips" and _RUN.value and _TASK.value:
+    raise UserError("--task goes with --expert: strips show runs' main tasks")
+  if _WHAT.value == "reset" and (_RUN.value or _EXPERT.value):
+    raise UserError("--what=reset shows the world alone, without an actor")
   if _TASK.value and (_EXPERT.value or _WHAT.value == "reset"):
     command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
   look = recorder.Look(
@@ -143,7 +149,8 @@ def _film_strips(look: recorder.Look) -> None:
   """A row of frames for each main task."""
   if _EXPERT.value:
     tasks = [_TASK.value] if _TASK.value else lfgp_dmc.MAIN_TASKS
-    specs = [policies.find("", _EXPERT.value, task) for task in tasks]
+    expert = functools.partial(policies.find, "", _EXPERT.value)
+    specs = [expert(task, _HERTZ.value) for task in tasks]
   else:
     specs = [policies.find(run) for run in _RUN.value.split(",")]
   output = _output("strips", (".png",))

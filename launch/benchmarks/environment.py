@@ -7,13 +7,17 @@ import numpy as np
 
 import lfgp_dmc
 from lfgp_dmc import graphics
+from lfgp_dmc.launch.configs import RunConfig
 
-_TASK = "stack"
 _RESETS = 20
 
 
-def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
-  """Measures on one core, on Stack, for `steps` control steps each time.
+def measure(
+  config: RunConfig, steps: int, seed: int
+) -> Iterator[tuple[str, float]]:
+  """Measures on one core for `steps` control steps each time.
+
+  Task and control rate are the config's.
 
   Yields:
     `control_steps_per_s`: through the dm_env interface with uniform random
@@ -22,10 +26,11 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
     `mj_step_fraction`: the first over the second. `reset_ms`. Where pictures
     can be made, `vision_steps_per_s`: the first with both cameras' frames.
   """
-  environment = lfgp_dmc.load(_TASK, seed=seed)
+  task, rate = config.main_task, config.control_hz
+  environment = lfgp_dmc.load(task, seed=seed, control_hz=rate)
   played = steps / _random_play(environment, steps, seed)
   yield "control_steps_per_s", played
-  alone = steps / _physics_alone(environment, steps, seed)
+  alone = steps / _physics_alone(environment, task, rate, steps, seed)
   yield "mj_step_per_s", alone
   yield "mj_step_fraction", played / alone
   start = time.perf_counter()
@@ -35,7 +40,9 @@ def measure(steps: int, seed: int) -> Iterator[tuple[str, float]]:
   environment.close()
   graphics.allow_pictures()
   if not graphics.fault():
-    environment = lfgp_dmc.load(_TASK, seed, observations="vision")
+    environment = lfgp_dmc.load(
+      task, seed, observations="vision", control_hz=rate
+    )
     yield "vision_steps_per_s", steps / _random_play(environment, steps, seed)
     environment.close()
 
@@ -55,20 +62,22 @@ def _random_play(environment, steps: int, seed: int) -> float:
   return time.perf_counter() - start
 
 
-def _physics_alone(environment, steps: int, seed: int) -> float:
+def _physics_alone(
+  environment, task: str, rate: int, steps: int, seed: int
+) -> float:
   """Seconds of the physics of `steps` control steps, replayed."""
   import mujoco
 
   from lfgp_dmc.tasks import experts
 
-  expert = experts.ScriptedExpert()
+  expert = experts.ScriptedExpert(control_hz=rate)
   model, data = environment.physics.model.ptr, environment.physics.data.ptr
   signature = mujoco.mjtState.mjSTATE_INTEGRATION
   state = np.empty(mujoco.mj_stateSize(model, signature))
   substeps = round(environment.control_timestep() / model.opt.timestep)
   seconds, done = 0.0, 0
   while done < steps:
-    expert.begin(_TASK, seed + done)
+    expert.begin(task, seed + done)
     timestep = environment.reset()
     mujoco.mj_getState(model, data, state, signature)
     controls = []

@@ -1,8 +1,12 @@
 """Bad input to the commands: one clear line, and nothing left behind."""
 
 import os
+import pathlib
+import subprocess
+import sys
 from unittest import mock
 
+from lfgp_dmc.launch import command
 from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
@@ -18,9 +22,13 @@ _BAD = (
   ("evaluate.py", "give one of --run=FOLDER and --expert=scripted"),
   ("evaluate.py --run=no/run", "no run folder no/run"),
   ("evaluate.py --expert=scripted --tasks=juggle", "unknown juggle; valid:"),
+  ("evaluate.py --run=no/run --control_hz=5", "--control_hz goes with --exp"),
   ("evaluate.py --expert=mine", "should be one of <scripted>"),
   ("evaluate.py --expert=scripted --episodes=0", "not a positive integer"),
   ("render_policy.py --expert=scripted --task=juggle", "valid: stack, "),
+  ("render_policy.py --run=a --control_hz=5", "--control_hz goes with --expe"),
+  ("render_policy.py --run=a --what=reset", "--what=reset shows the world"),
+  ("render_policy.py --run=a --what=strips --task=lift", "--task goes with"),
   ("render_policy.py --expert=scripted --height=99999", "4320"),
   ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
   (
@@ -93,6 +101,13 @@ class ArgumentsTest(FolderTest):
     self.assertEqual(done.returncode, 1)
     self.assertIn(r"error: --run=runs/\udcc3\udcb6 is not text", done.stderr)
     self.assertEqual(done.stderr.count("\n"), 1)
+
+  def test_a_pipe_that_closes_ends_the_help(self):
+    script = pathlib.Path(command.__file__).with_name("train.py")
+    line = f"{sys.executable} {script} --help | head -1"
+    done = subprocess.run(line, shell=True, capture_output=True, text=True)
+    self.assertNotEmpty(done.stdout)
+    self.assertEmpty(done.stderr)
 
 
 class BadInputTest(FolderTest):

@@ -132,6 +132,8 @@ class BlockRunTest(absltest.TestCase):
     for change, message in (
       ({"environment": "no.such:thing"}, "No module named 'no'"),
       ({"main_task": "juggle"}, "unknown task 'juggle'; valid tasks: stack"),
+      ({"main_task": "insert"}, "main_task is 'insert'; the policy in .* has:"),
+      ({"control_hz": "x"}, "control_hz is 'x'; valid: 20, 10, 5"),
       ({"policy": {}}, "policy.tasks is missing"),
     ):
       text = json.dumps({**stored, **change})
