@@ -43,8 +43,8 @@ def define(
     "preset",
     "paper",
     "Defaults of the config: paper (the paper's tables), ral (the authors' "
-    "later journal version), fast, fast_precise, few or pixels (ours). "
-    "--config.x=... overrides.",
+    "later journal version), vpace (their latest), fast, fast_precise, few "
+    "or pixels (ours). --config.x=... overrides.",
     flag_values=flag_values,
   )
   config_flags.DEFINE_config_dict(

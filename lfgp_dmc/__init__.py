@@ -1,8 +1,8 @@
 """LfGP-DMC: Learning from Guided Play in dm_control, from one import.
 
     import lfgp_dmc
-    environment = lfgp_dmc.load("stack", seed=0)
     policy = lfgp_dmc.load_policy("runs/NAME")
+    environment = lfgp_dmc.load("stack", 0, control_hz=policy.control_hz)
     timestep = environment.reset()
     action = policy(lfgp_dmc.flatten(timestep.observation))
 
@@ -80,13 +80,15 @@ class StoredPolicy:
   Attributes:
     intentions: their names, the main task's first.
     intention: the name of the one that acts unless a call names another.
+    control_hz: the control rate that it was trained at, for `load`.
   """
 
-  def __init__(self, policy: Any, intention: str):
+  def __init__(self, policy: Any, intention: str, control_hz: int = 20):
     """Wraps an `agents.policy.Policy`; `load_policy` does it."""
     self._policy = policy
     self.intentions: tuple[str, ...] = policy.tasks
     self.intention = intention
+    self.control_hz = control_hz
 
   def __call__(
     self, observation: np.ndarray, intention: str | None = None
@@ -120,6 +122,7 @@ def load_policy(
       intentions.
   """
   from lfgp_dmc.agents.policy import Policy
+  from lfgp_dmc.runs.run_folder import read_config
 
   policy = Policy.load(os.fspath(run_folder))
   task = policy.tasks[0] if task is None else task
@@ -129,4 +132,6 @@ def load_policy(
       f"{', '.join(policy.tasks)}"
     )
   policy.begin(task, seed)
-  return StoredPolicy(policy, task)
+  return StoredPolicy(
+    policy, task, read_config(run_folder).get("control_hz", 20)
+  )

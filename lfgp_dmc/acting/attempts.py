@@ -14,6 +14,7 @@ from lfgp_dmc.acting import rollout
 from lfgp_dmc.acting.environments import has_succeeded, is_physics_failure
 from lfgp_dmc.types import Actor, Step, Transition
 
+EPISODE = 360  # steps of the block tasks' at 20 Hz
 LIMIT = 90  # steps of an attempt at 20 Hz (the released code's)
 # Unstack-Stack's is the authors' later setting. The others are ours: Bring's
 # expert may have to take green out of blue's zone first (a quarter of the
@@ -43,7 +44,7 @@ class CollectionPlan:
   tasks: tuple[str, ...]  # T_all, the main task first
   seed: int  # everything random follows from it
   control_hz: int = 20
-  play_steps: int = 360  # at 20 Hz, between resets in play-based collection
+  play_steps: int = EPISODE  # at 20 Hz, between resets in play-based collection
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
   # Of so many reset-based attempts the longest: hard starts are over-sampled.
   keep_longest_of: int = 1
@@ -57,10 +58,13 @@ class CollectionPlan:
   def limit(self, task: str) -> int:
     """Most control steps of an attempt; twice the time at lower rates.
 
-    Experts take longer there, and hard starts must not be missing.
+    Experts take longer there, and hard starts must not be missing. No attempt
+    is longer than an episode.
     """
     at_20_hz = self.limits.get(task, LIMIT)
-    return self.steps(at_20_hz if self.control_hz >= 20 else 2 * at_20_hz)
+    if self.control_hz < 20:
+      at_20_hz = min(2 * at_20_hz, EPISODE)
+    return self.steps(at_20_hz)
 
 
 class Attempt(NamedTuple):
@@ -80,6 +84,11 @@ class Collector:
     self._actor = plan.make_actor()
     self._environments: dict[str, Any] = {}
     self._environment: Any = None
+
+  def close(self) -> None:
+    """Frees the environments."""
+    for environment in self._environments.values():
+      environment.close()
 
   def __call__(self, job: Job) -> tuple[str | None, list[Attempt]]:
     """Makes the attempts of a job, in order; returns them with its task."""

@@ -7,6 +7,7 @@ from absl.testing import absltest, parameterized
 
 import lfgp_dmc
 from lfgp_dmc import seeding
+from lfgp_dmc.runs import run_folder
 
 
 class _Policy:
@@ -38,7 +39,11 @@ class FacadeTest(parameterized.TestCase):
     load.assert_called_once_with("stack", seed=3, reward="dense")
 
   def test_load_policy_acts_for_the_named_task(self):
-    with mock.patch("lfgp_dmc.agents.policy.Policy", _Policy):
+    config = {"control_hz": 5}
+    with (
+      mock.patch("lfgp_dmc.agents.policy.Policy", _Policy),
+      mock.patch.object(run_folder, "read_config", return_value=config),
+    ):
       main = lfgp_dmc.load_policy("runs/a")
       reach = lfgp_dmc.load_policy("runs/a", "reach")
       with self.assertRaisesRegex(ValueError, "'lift'; it has: stack, reach"):
@@ -47,6 +52,7 @@ class FacadeTest(parameterized.TestCase):
     self.assertEqual(main(observation)[0], 0)
     self.assertEqual(reach(observation)[0], 1)
     self.assertEqual(main.intentions, ("stack", "reach"))
+    self.assertEqual(main.control_hz, 5)
     self.assertEqual(main(observation, "reach")[0], 1)
     main.intention = "reach"
     self.assertEqual(main(observation)[0], 1)
