@@ -92,7 +92,7 @@ def _check(given: Mapping[str, Any]) -> None:
         f"unknown {name} {given[name]!r}; valid: {', '.join(map(str, valid))}"
       )
   size = given["camera_size"]
-  if not isinstance(size, numbers.Integral) or not 32 <= size <= 480:
+  if not isinstance(size, numbers.Integral) or not 32 <= int(size) <= 480:
     raise ValueError(f"camera_size is {size!r}; valid: 32 to 480")
   if given["observations"] != "features":
     graphics.allow_pictures()
