@@ -95,10 +95,16 @@ class CloningTest(fixtures.RunTest):
     self.assertEqual(act(np.zeros(5, np.float32)).shape, (1,))
 
   def test_asks_for_demonstrations_of_the_main_task_alone(self):
-    with self.assertRaisesRegex(
-      UserError, "--task=right --tasks=right --pairs_per_task"
+    for pairs, message in (
+      (50, "collect it: .* --task=lift --tasks=lift --pairs_per_task=50"),
+      (0, "collect it by .*; the head of a flagfile says how"),
     ):
-      self.train(self.config("bc", demonstrations="no/where"))
+      config = self.config(
+        "bc", demonstrations="no/where", environment="", main_task="lift",
+        pairs_per_task=pairs,
+      )  # fmt: skip
+      with self.assertRaisesRegex(UserError, message):
+        self.train(config)
 
 
 class DacRunTest(fixtures.RunTest):
