@@ -24,7 +24,7 @@ from lfgp_dmc.launch import command, datasets, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc.observations import REWARD_PREFIX, SUCCESS_PREFIX
-from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import TrainSchedule
@@ -57,8 +57,13 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   """
   device = _set_up_torch(config)
   with command.checked_input():
+    # Without `reseed`, each continuation has starts of its own.
+    count = (
+      len(checkpoints.every(RunFolder(folder).checkpoints)) if folder else 0
+    )
     environment = config.environment_spec.build(
-      config.agent.keeps_rewards, seeding.derive(config.seed, "environment")
+      config.agent.keeps_rewards,
+      seeding.derive(config.seed, "environment", count),
     )
     tasks = tasks_of(config, environment)
     shape = environments.frame_shape(environment)

@@ -70,10 +70,9 @@ def run(
       return flags.FLAGS([argv[0], *arguments])
     except (flags.Error, ValueError) as error:
       sys.exit(_fail(str(error)))
-    except BrokenPipeError:
-      sys.exit(_close_output())
 
-  app.run(guarded_main, flags_parser=parse)
+  with _quiet_after_a_closed_pipe():
+    app.run(guarded_main, flags_parser=parse)
 
 
 def _readable(arguments: Sequence[str]) -> list[str]:
@@ -102,8 +101,8 @@ def guarded(main: Callable[[], int | None]) -> int | None:
     return main()
   except UserError as error:
     return _fail(str(error))
-  except BrokenPipeError:
-    return _close_output()
+  except BrokenPipeError:  # such as `| head`
+    return 1
   except OSError as error:
     return _fail(str(error))
   except LostWorkerError as error:
@@ -148,10 +147,17 @@ def _is_relevant(record: logging.LogRecord) -> bool:
   return not is_theirs or record.levelno >= logging.WARNING
 
 
-def _close_output() -> int:
-  """After `| head`: what is left to print would fail again at the exit."""
-  os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-  return 1
+@contextlib.contextmanager
+def _quiet_after_a_closed_pipe() -> Iterator[None]:
+  """Exits with 1 and without a traceback after `| head`."""
+  try:
+    try:
+      yield
+    finally:
+      sys.stdout.flush()  # at the exit nobody would catch what it raises
+  except BrokenPipeError:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    sys.exit(1)
 
 
 def _fail(message: str) -> int:

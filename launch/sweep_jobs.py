@@ -20,6 +20,7 @@ COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
            "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
 
 _STEPS = "--config.env_steps="
+_MAY_CHANGE = ("--config.demonstrations=", "--config.evaluation_workers=")
 _ENDLESS = 1 << 62
 
 # States, in the life of a run.
@@ -55,6 +56,15 @@ class Job:
     given = [a.removeprefix(_STEPS) for a in self.arguments if _STEPS in a]
     return int(given[-1]) if given and given[-1].isdecimal() else 0
 
+  def _resumed_arguments(self) -> list[str]:
+    """What a run that goes on takes: all else is as it was started."""
+    known = *_MAY_CHANGE, *((_STEPS,) if self.wants_more_steps() else ())
+    return [a for a in self.arguments if a.startswith(known)]
+
+  def wants_more_steps(self) -> bool:
+    """Whether its arguments let it be longer than it was started with."""
+    return self.steps > _steps_of(self.folder)
+
   @property
   def log(self) -> pathlib.Path:
     """What the run prints, all attempts in one file."""
@@ -63,7 +73,7 @@ class Job:
   def train_arguments(self) -> list[str]:
     """Of `launch/train.py`: from the beginning, or on from a checkpoint."""
     if (self.folder / run_folder.CONFIG_NAME).exists():
-      return [f"--run={self.folder}", "--resume", *self.arguments]
+      return [f"--run={self.folder}", "--resume", *self._resumed_arguments()]
     return [
       f"--flagfile={self.flagfile}",
       f"--config.main_task={self.main_task}",
@@ -172,7 +182,7 @@ def recall(jobs: Sequence[Job], index: pathlib.Path) -> None:
       job.wall_s = float(row["wall_s"])
     was_done = row is not None and row["state"] == DONE
     is_there = (job.folder / run_folder.CONFIG_NAME).is_file()
-    if not is_there or job.steps > _steps_of(job.folder):
+    if not is_there or job.wants_more_steps():
       continue
     if was_done or _is_done(job.folder):
       job.state = DONE

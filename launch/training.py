@@ -18,7 +18,7 @@ from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import assemble, command, sizes
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
-from lfgp_dmc.runs import checkpoints, metrics, run_folder
+from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 from lfgp_dmc.types import Agent
@@ -41,6 +41,11 @@ def train(
   if not resume and path.exists():
     raise UserError(
       f"{path} exists; continue it with --resume, or choose another --run"
+    )
+  if config.episode_steps and not (resume or config.environment):
+    raise UserError(
+      f"config.episode_steps is {config.episode_steps}; valid: 0, the block "
+      "tasks' own, or the number of config.environment"
     )
   sizes.check(config, path)
   files.check_writable(path / run_folder.CONFIG_NAME)
@@ -98,15 +103,17 @@ def _check_continues(
 ) -> None:
   """Raises UserError if starting anew would overwrite what was learned.
 
-  A run that was killed before its first checkpoint has learned little.
+  That is a policy folder, or a run that lost its checkpoints: one that was
+  killed before the first has learned little.
   """
+  if checkpoints.every(folder.checkpoints) or not folder.has_policy:
+    return
   step = stored.get(run_folder.POLICY_FIELD, {}).get("env_step", 0)
-  first = config.checkpoint_every + config.most_episode_steps
-  is_young = step < first and (folder.path / metrics.NAME).exists()
-  if step and not is_young and not checkpoints.every(folder.checkpoints):
+  end = min(2 * config.checkpoint_every, stored.get("env_steps", 0))
+  if step >= end or not folder.is_run:
     raise UserError(
       f"{folder.path} has a policy of step {step}, but no checkpoint to go on "
-      f"from; a new run may start from it: --config.init_from={folder.path}"
+      "from: put its checkpoints/ back, or start a new run"
     )
 
 
@@ -176,7 +183,7 @@ def _check_source(config: RunConfig, path: files.Path, field: str) -> None:
   """
   stored = run_folder.read_config(path)
   rate = stored.get("control_hz", config.control_hz)
-  if rate != config.control_hz:
+  if rate != config.control_hz and not config.environment:
     raise ValueError(
       f"config.control_hz is {config.control_hz}; {field} {path} has {rate}"
     )

@@ -138,7 +138,7 @@ class PlayEnvironment(composer.Environment):
 
     Args:
       tcp: [3], m, in the robot's base frame; outside the set-point's box
-        (`workspace.py`) the first step pulls it back in.
+        (`workspace.py`) the control pulls it back in.
       blue: [7], x y z in m and quaternion w x y z.
       green: [7], likewise.
       fingers: opening of both, 0 closed to 1 open; held until the first

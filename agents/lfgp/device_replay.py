@@ -47,6 +47,7 @@ class DeviceReplay:
     """Copies the rows of these numbers that can be sampled."""
     replay = self._replay
     oldest = replay.total - len(replay)
+    stop = min(stop, replay.total)
     for first in range(max(start, oldest), stop, _CHUNK):
       numbers = np.arange(first, min(first + _CHUNK, stop))
       rows = torch.from_numpy(numbers % replay.capacity)

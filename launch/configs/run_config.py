@@ -104,11 +104,6 @@ class RunConfig:
         f"environment is {self.environment!r}; valid: nothing (the block "
         "tasks) or package.module:factory"
       )
-    if self.episode_steps and not self.environment:
-      yield (
-        f"episode_steps is {self.episode_steps}; valid: 0 without environment "
-        f"(the block tasks' last {EPISODE_SECONDS} s)"
-      )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
     for name, why in (
@@ -151,13 +146,14 @@ class RunConfig:
     if (
       isinstance(agent, LfgpConfig)
       and agent.prior.weight
-      and not (agent.pretraining.updates or self.init_from)
+      and not agent.pretraining.updates
+      and not (self.init_from or self.transfer_from)
       and not self.camera_size  # which needs init_from anyway
     ):
       yield (
         f"agent.prior.weight is {agent.prior.weight}; valid: 0 without "
-        "agent.pretraining.updates or init_from (the intentions would be held "
-        "at random ones)"
+        "agent.pretraining.updates, init_from or transfer_from (the intentions "
+        "would be held at random ones)"
       )
     if not self.init_from:
       return

@@ -9,15 +9,13 @@ from tensorboard.summary.writer import event_file_writer
 
 from lfgp_dmc.data import csv_files, files
 
-NAME = "metrics.csv"  # in the run's folder
-
 
 class MetricsLog:
   """Appends rows whose columns are fixed by the first one."""
 
   def __init__(self, folder: files.Path):
     """Opens the log of a run's folder, and continues one that exists."""
-    self._path = pathlib.Path(folder) / NAME
+    self._path = pathlib.Path(folder) / "metrics.csv"
     self._columns: list[str] = []
     if self._path.exists():
       self._columns, _ = csv_files.read(self._path, is_log=True)

@@ -22,6 +22,7 @@ ARRAYS_NAME = "policy.safetensors"
 POLICY_FIELD = "policy"
 # When a run is resumed: neither changes a number, if the data are the same.
 _MAY_CHANGE = ("demonstrations", "demonstrations_sha256", "evaluation_workers")
+_LOCK = "run.lock"
 _SHOWN = 4  # differing fields in a message
 
 
@@ -46,6 +47,16 @@ class RunFolder:
   def replay(self) -> pathlib.Path:
     """The folder of the mapped replay."""
     return self.path / "replay"
+
+  @property
+  def has_policy(self) -> bool:
+    """Whether a policy was stored in it."""
+    return (self.path / ARRAYS_NAME).exists()
+
+  @property
+  def is_run(self) -> bool:
+    """Whether a run has worked in it; else it is a policy folder."""
+    return (self.path / _LOCK).exists()
 
 
 def default_path(
@@ -164,7 +175,7 @@ def _differing_fields(
 
 def _locked(path: pathlib.Path):
   """An open file whose lock the system releases however the process ends."""
-  file = open(path / "run.lock", "w")  # noqa: SIM115 - held open by the run
+  file = open(path / _LOCK, "w")  # noqa: SIM115 - held open by the run
   try:
     with files.naming(file.name):  # some file systems have no locks
       fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -104,10 +104,17 @@ class ArgumentsTest(FolderTest):
 
   def test_a_pipe_that_closes_ends_the_help(self):
     script = pathlib.Path(command.__file__).with_name("train.py")
-    line = f"{sys.executable} {script} --help | head -1"
-    done = subprocess.run(line, shell=True, capture_output=True, text=True)
-    self.assertNotEmpty(done.stdout)
-    self.assertEmpty(done.stderr)
+    for unbuffered in ("1", ""):
+      read, write = os.pipe()
+      os.close(read)
+      done = subprocess.run(
+        [sys.executable, script, "--help"],
+        stdout=write,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+      )
+      os.close(write)
+      self.assertEqual((done.returncode, done.stderr), (1, b""))
 
 
 class BadInputTest(FolderTest):

@@ -148,7 +148,6 @@ class ConfigTest(parameterized.TestCase):
     ("--config.environment=toy", "config.environment is 'toy'; valid"),
     ("--config.control_hz=7", "config.control_hz is 7; valid: 20, 10, 5"),
     ("--config.init_from=a", "config.init_from is 'a'; valid: nothing, unl"),
-    ("--config.episode_steps=9", "config.episode_steps is 9; valid: 0 without"),
     (
       "--config.replay_capacity=999",
       "config.warm_up is 1000; valid: at most replay_capacity, 999",

@@ -158,6 +158,13 @@ class SweepTest(FolderTest):
     )
     self.assertEqual(again[2].wall_s, 60)
     self.assertIn("--resume", again[0].train_arguments())
+    given = ["--preset=ral", "--config.demonstrations=d", "--config.env_steps="]
+    same = self._jobs(
+      ("lfgp",), (0, 1), arguments=[*given[:2], given[2] + "99"]
+    )
+    sweep_jobs.recall(same, index)
+    self.assertEqual([j.state for j in same], [j.state for j in again])
+    self.assertEqual(same[0].train_arguments()[2:], given[1:2])
     longer = self._jobs(("lfgp",), (0, 1), arguments=["--config.env_steps=101"])
     sweep_jobs.recall(longer, index)
     self.assertEqual({job.state for job in longer}, {"waiting"})

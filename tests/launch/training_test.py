@@ -102,15 +102,17 @@ class TrainingTest(fixtures.RunTest):
   def test_a_policy_without_checkpoints_is_not_started_anew(self):
     path, _ = self.train(self.config())
     shutil.rmtree(path / "checkpoints")
-    for lost in ("run.lock", "metrics.csv"):  # of a run, then a policy folder
-      (path / lost).unlink()
+    for steps in (200, 400):  # a run that ended; a policy folder
       kept = {file: file.read_bytes() for file in path.glob("*.*")}
       with self.assertRaisesRegex(
-        UserError, "policy of step 200, but no checkpoint.*init_from=.*runs/a"
+        UserError, "policy of step 200, but no checkpoint to go on from"
       ):
-        self.train(self.config(), resume=True)
+        self.train(
+          self.config(env_steps=steps, checkpoint_every=150), "a", True
+        )
       found = {file: file.read_bytes() for file in path.glob("*.*")}
       self.assertEqual(found, kept)
+      (path / "run.lock").unlink(missing_ok=True)
 
   def test_another_config_is_not_resumed(self):
     self.train(self.config(env_steps=40))
@@ -171,6 +173,10 @@ class TrainingTest(fixtures.RunTest):
     ({"environment": "lfgp_dmc.toy:Nothing"}, "has no attribute 'Nothing'"),
     ({"environment": "nothing.at:all"}, "No module named 'nothing'"),
     ({"device": "abacus"}, "config.device is 'abacus'"),
+    (
+      {"environment": "", "main_task": "lift", "episode_steps": 9},
+      "config.episode_steps is 9; valid: 0",
+    ),
     ({"pairs_per_task": 61}, r"fewer pairs of right \(60\), left \(60\)"),
     (
       {"attempts_per_task": 61},

@@ -218,12 +218,16 @@ class InitFromTest(_RunTest):
     expected = Policy.load(source).act(rows, "left")
     np.testing.assert_array_equal(acts, [expected])
     self.train(config, "a", resume=True)  # was killed at once: starts again
-    files.write_json(
-      bare / "config.json",
-      files.read_json(bare / "config.json") | {"control_hz": 5},
-    )
+    fixtures.write_dataset(self.folder / "lift", ("lift",), 59, 4)
+    block = self.config(
+      init_from=str(bare), demonstrations=str(self.folder / "lift"),
+      environment="", main_task="lift", control_hz=20,
+      **{"agent.networks.actor_trunk": "own"},
+    )  # fmt: skip
+    options = files.read_json(bare / "config.json")
+    files.write_json(bare / "config.json", options | {"control_hz": 5})
     with self.assertRaisesRegex(UserError, "control_hz is 20; init_from .* 5"):
-      self.train(config, "b")
+      self.train(block, "b")
     wrong = self.config(
       init_from=str(self.folder / "data"),
       **{"agent.networks.actor_trunk": "own"},
