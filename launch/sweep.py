@@ -6,9 +6,11 @@
 
 A run is a flagfile with a main task and a seed. Each gets one process with one
 thread; one that dies is resumed from its checkpoint, and what is done is not
-done again, so the same command goes on with a sweep that was stopped. Ctrl-C
-lets the runs write their checkpoints. RUNS/index.csv has a row a run,
-RUNS/NAME.log its output. With --ray_address=auto the runs go to a Ray cluster
+done again, so the same command goes on with a sweep that was stopped. What a
+run that goes on takes of --train are more steps and where demonstrations are;
+all else stays as it was started. Ctrl-C lets the runs write their checkpoints.
+RUNS/index.csv has a row a run, RUNS/NAME.log its output. With
+--ray_address=auto the runs go to a Ray cluster
 instead (`ray start` on each machine). Its nodes share this folder and have the
 same Python environment; a run whose node is lost is resumed on another.
 """
