@@ -83,7 +83,8 @@ class RunConfig:
   # while the other trains critics and intentions.
   threads: Processes = 1
   # Products in bfloat16, unless the CPU would emulate them; parameters stay
-  # float32.
+  # float32. Not for values in the hundreds, as of the paper's settings: they
+  # are rounded to steps of 1, as much as actions differ.
   bfloat16: Switch = False
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
   deterministic: Switch = False  # the same numbers again, after a resume too
