@@ -171,17 +171,20 @@ def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
     _transfer(config, agent, replay)
   if config.init_from:
     policy = Policy.load(config.init_from)
-    _check_source(config, config.init_from, "init_from")
+    stored = run_folder.read_config(config.init_from)
+    _check_source(config, "init_from", stored)
     agent.start_from(policy)
     print(f"the intentions start as those of {config.init_from}")
 
 
-def _check_source(config: RunConfig, path: files.Path, field: str) -> None:
+def _check_source(
+  config: RunConfig, field: str, stored: dict[str, Any]
+) -> None:
   """Raises ValueError if what is taken over means other steps or inputs.
 
   Sizes of arrays do not tell.
   """
-  stored = run_folder.read_config(path)
+  path = getattr(config, field)
   rate = stored.get("control_hz", config.control_hz)
   if rate != config.control_hz and not config.environment:
     raise ValueError(
@@ -201,8 +204,8 @@ def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
   """Section 5.2 of the paper: networks by task name, and the whole replay."""
   source = RunFolder(pathlib.Path(config.transfer_from))
   try:
-    tasks = run_folder.read_config(source.path)["policy"]["tasks"]
-    _check_source(config, source.path, "transfer_from")
+    stored = run_folder.read_config(source.path)
+    tasks = stored["policy"]["tasks"]
     path = checkpoints.latest(source.checkpoints)
     if path is None:
       raise ValueError(f"{source.path} has no good checkpoint yet")
@@ -214,6 +217,7 @@ def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
     ) from None
   except ValueError as error:
     raise ValueError(f"config.transfer_from: {error}") from None
+  _check_source(config, "transfer_from", stored)
   agent.carry_over(
     networks, tasks, config.transfer_updates, config.transfer_main_head
   )

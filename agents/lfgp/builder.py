@@ -17,7 +17,7 @@ from lfgp_dmc.agents.lfgp.config import (
 from lfgp_dmc.agents.lfgp.critic_learner import CriticLearner
 from lfgp_dmc.agents.lfgp.cuda_graphs import CudaRecorder
 from lfgp_dmc.agents.lfgp.discriminator_reward import DiscriminatorRewards
-from lfgp_dmc.agents.lfgp.example_reward import ExampleRewards, example_rows
+from lfgp_dmc.agents.lfgp.example_reward import ExampleRewards
 from lfgp_dmc.agents.lfgp.intention_learner import IntentionLearner
 from lfgp_dmc.agents.lfgp.learner import LfgpLearner
 from lfgp_dmc.agents.lfgp.networks import LfgpNetworks, Training, make_networks
@@ -61,7 +61,6 @@ def build(
       do not fit.
   """
   del unused
-  _check_examples(config, len(tasks))
   device = torch.device(device)
   dtype = torch.bfloat16 if bfloat16 else torch.float32
   random = functools.partial(seeding.generator, seed)
@@ -94,18 +93,6 @@ def build(
     experts,
     seed,
   )
-
-
-def _check_examples(config: LfgpConfig, tasks: int) -> None:
-  """Raises ValueError if a batch has no example of some task."""
-  if not isinstance(config.reward, ExampleReward):
-    return
-  rows = example_rows(config.reward, config.batch_size)
-  if rows < tasks:
-    raise ValueError(
-      f"agent.batch_size is {config.batch_size}; valid: more, since "
-      f"agent.reward.share of it are {rows} examples of {tasks} tasks"
-    )
 
 
 def make_learner(

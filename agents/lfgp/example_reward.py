@@ -41,13 +41,19 @@ class ExampleRewards(RewardSource):
   bounds = ExampleBounds
 
   def __init__(self, config: ExampleReward, batch_size: int, shared: Training):
-    """`batch_size` counts examples in."""
-    self._scale = config.scale
-    self._policy_rows = batch_size - example_rows(config, batch_size)
+    """`batch_size` counts examples in; ValueError if some task has none."""
     networks, _, self._generator, self._dtype = shared
-    self._intentions = networks.intentions
     temperature = networks.log_temperature
-    tasks = torch.arange(len(temperature), device=temperature.device)
+    rows, count = example_rows(config, batch_size), len(temperature)
+    if rows < count:
+      raise ValueError(
+        f"agent.batch_size is {batch_size}; valid: more, since "
+        f"agent.reward.share of it are {rows} examples of {count} tasks"
+      )
+    self._scale = config.scale
+    self._policy_rows = batch_size - rows
+    self._intentions = networks.intentions
+    tasks = torch.arange(count, device=temperature.device)
     self._tasks = tasks[:, None]
 
   def label(self, batch: Batch) -> LabelledBatch:

@@ -94,12 +94,17 @@ class RunConfig:
   @model_validator(mode="after")
   def _check_fields_together(self):
     """Raises ValueError that lists every fault."""
-    faults = list(self._faults())
+    faults = [
+      *self._faults_of_environment(),
+      *self._faults_of_demonstrations(),
+      *self._faults_of_acting(),
+      *self._faults_of_start(),
+    ]
     if faults:
       raise ValueError("\n".join(faults))
     return self
 
-  def _faults(self):
+  def _faults_of_environment(self):
     if self.environment and ":" not in self.environment:
       yield (
         f"environment is {self.environment!r}; valid: nothing (the block "
@@ -107,6 +112,11 @@ class RunConfig:
       )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
+    if self.control_hz not in CONTROL_RATES:
+      rates = ", ".join(map(str, CONTROL_RATES))
+      yield f"control_hz is {self.control_hz!r}; valid: {rates}"
+
+  def _faults_of_demonstrations(self):
     for name, why in (
       ("mirror_demonstrations", "frames have no mirror image"),
       ("shifted_copies", "frames cannot be shifted so"),
@@ -119,11 +129,6 @@ class RunConfig:
         )
       if self.camera_size and value:
         yield f"{valid} camera_size ({why})"
-    if self.warm_up > self.replay_capacity and not self.transfer_from:
-      yield (
-        f"warm_up is {self.warm_up}; valid: at most replay_capacity, "
-        f"{self.replay_capacity}"
-      )
     if self.attempts_per_task and self.pairs_per_task:
       yield (
         f"attempts_per_task is {self.attempts_per_task}; valid: 0 with "
@@ -135,14 +140,20 @@ class RunConfig:
         "collect_missing is True; valid: False without pairs_per_task or "
         "attempts_per_task, or with environment"
       )
+
+  def _faults_of_acting(self):
+    if self.warm_up > self.replay_capacity and not self.transfer_from:
+      yield (
+        f"warm_up is {self.warm_up}; valid: at most replay_capacity, "
+        f"{self.replay_capacity}"
+      )
     if self.camera_size and self.transfer_from:
       yield (
         f"transfer_from is {self.transfer_from!r}; valid: nothing with "
         "camera_size (its features would be another encoder's)"
       )
-    if self.control_hz not in CONTROL_RATES:
-      rates = ", ".join(map(str, CONTROL_RATES))
-      yield f"control_hz is {self.control_hz!r}; valid: {rates}"
+
+  def _faults_of_start(self):
     agent = self.agent
     if (
       isinstance(agent, LfgpConfig)
@@ -159,11 +170,11 @@ class RunConfig:
     if not self.init_from:
       return
     valid = f"init_from is {self.init_from!r}; valid: nothing"
-    if not isinstance(self.agent, LfgpConfig):
+    if not isinstance(agent, LfgpConfig):
       yield f"{valid} with {self.algorithm}"
-    elif self.agent.pretraining.updates:
+    elif agent.pretraining.updates:
       yield f"{valid}, if there are agent.pretraining.updates"
-    elif self.agent.shares_trunk:
+    elif agent.shares_trunk:
       yield (
         f"{valid}, unless agent.networks.actor_trunk is own (the critics' "
         "loss would undo it)"
