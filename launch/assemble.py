@@ -71,7 +71,7 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   found = datasets.load(config, tasks, widths, shape)
   if not shape or ALGORITHMS[config.algorithm].is_supervised:
     return Parts(environment, tasks, widths, found, device, shape)
-  clone = _clone_of(config, folder)
+  clone = _clone_of(config, folder, shape)
   environment = environments.with_features(environment, clone.encode)
   found = {k: _with_features(k, data, clone) for k, data in found.items()}
   widths = environments.widths(environment)
@@ -79,7 +79,9 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   return Parts(environment, tasks, widths, found, device, shape, encoder)
 
 
-def _clone_of(config: RunConfig, folder: pathlib.Path | None) -> Policy:
+def _clone_of(
+  config: RunConfig, folder: pathlib.Path | None, shape: tuple[int, ...]
+) -> Policy:
   """Whose encoder is used: the run's own policy, or what it starts from."""
   if not config.init_from:
     raise UserError(
@@ -94,6 +96,11 @@ def _clone_of(config: RunConfig, folder: pathlib.Path | None) -> Policy:
     policy = Policy.load(source)
   if not policy.frame_shape:
     raise UserError(f"config.init_from: {config.init_from} sees no pixels")
+  if policy.frame_shape != shape:
+    raise UserError(
+      f"config.init_from: {config.init_from} sees frames "
+      f"{list(policy.frame_shape)}; the environment has {list(shape)}"
+    )
   return policy
 
 

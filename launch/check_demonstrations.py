@@ -11,7 +11,9 @@ shows an attempt of each task in the block world, a row of frames each.
 import contextlib
 import functools
 import pathlib
+from collections.abc import Sequence
 
+import dm_env
 from absl import flags
 
 import lfgp_dmc
@@ -21,11 +23,12 @@ from lfgp_dmc.data import demonstration_summary, demonstrations, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
+from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.pictures import film_strips, recorder, video
 
 _DATASET = flags.DEFINE_string("dataset", "", "The dataset's folder.")
 _TASK = flags.DEFINE_string(
-  "task", "", "The main task, of the block tasks; default: whatever is there."
+  "task", "", "The main task, whose T_all is read; default: whatever is there."
 )
 _ENVIRONMENT = flags.DEFINE_string(
   "environment", "", "As config.environment; default: the block tasks."
@@ -43,6 +46,8 @@ def main() -> None:
   """Reads every file, prints, and fails if there is a fault."""
   if not _DATASET.value:
     raise UserError("--dataset is not set: give the dataset's folder")
+  if _CAMERA.value and _ENVIRONMENT.value:
+    raise UserError("--camera_size is of the block tasks, not --environment")
   if _STRIP.value:
     _check_strip(pathlib.Path(_STRIP.value))
   with command.checked_input():
@@ -52,21 +57,22 @@ def main() -> None:
       camera_size=_CAMERA.value,
     )
     with contextlib.closing(spec.build()) as environment:
-      shape = environments.frame_shape(environment)
-      found = _read(environments.widths(environment), shape)
+      found = _read(environment)
       if _STRIP.value:
         _draw(environment, found)
 
 
 def _read(
-  widths: tuple[int, int], shape: tuple[int, ...]
+  environment: dm_env.Environment,
 ) -> dict[str, demonstrations.Demonstrations]:
   """Reads and describes; raises ValueError with every fault."""
+  widths = environments.widths(environment)
+  shape = environments.frame_shape(environment)
   folder = pathlib.Path(_DATASET.value)
   paths = files.own(folder, demonstrations.SUFFIX)
   tasks = [path.stem for path in paths] or ["TASK"]
-  if _TASK.value and not _ENVIRONMENT.value:
-    tasks = list(lfgp_dmc.task_set(_TASK.value))
+  if _TASK.value:
+    tasks = list(_tasks_of(_TASK.value, environment))
   found = demonstrations.read_folder(folder, tasks, *widths, shape)
   print(demonstration_summary.table(found))
   rates = sorted({data.attributes["control_hz"] for data in found.values()})
@@ -80,6 +86,15 @@ def _read(
   if len(rates) > 1:
     raise ValueError(f"{folder} has several control rates")
   return found
+
+
+def _tasks_of(main: str, environment: dm_env.Environment) -> Sequence[str]:
+  """What LfGP learns of it."""
+  if _ENVIRONMENT.value:
+    return environments.with_observed_tasks(
+      environment, (main,), SUCCESS_PREFIX
+    )
+  return lfgp_dmc.task_set(main)
 
 
 def _check_strip(strip: pathlib.Path) -> None:

@@ -47,7 +47,7 @@ _LONGEST = flags.DEFINE_integer(
   lower_bound=1,
 )
 _SEED = flags.DEFINE_integer(
-  "seed", 0, "Everything random follows from it.", lower_bound=0
+  "seed", 0, "Everything random follows from it.", 0, 2**63 - 1
 )
 _OUTPUT = flags.DEFINE_string("output", None, "New folder for the dataset.")
 _EXPERT = flags.DEFINE_string(

@@ -27,7 +27,7 @@ _ATTRIBUTES = flags.DEFINE_list(
   "attributes", [], "name=value pairs that go over those in Minari."
 )
 
-_NUMBERS = ("seed", "control_hz")
+_NUMBERS = {"seed": int, "control_hz": float}
 
 
 def main() -> None:
@@ -69,13 +69,16 @@ def main() -> None:
       print(folder / (task + demonstrations.SUFFIX))
 
 
-def _attributes() -> dict[str, str | int]:
-  values: dict[str, str | int] = {}
+def _attributes() -> dict[str, str | float]:
+  values: dict[str, str | float] = {}
   for pair in _ATTRIBUTES.value:
     name, equals, value = pair.partition("=")
     if not equals:
       raise UserError(f"--attributes={pair}; valid: name=value,...")
-    values[name] = int(value) if name in _NUMBERS else value
+    try:
+      values[name] = _NUMBERS.get(name, str)(value)
+    except ValueError as error:
+      raise UserError(f"--attributes={pair}: {error}") from None
   return values
 
 

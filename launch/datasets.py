@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from lfgp_dmc import seeding
-from lfgp_dmc.data import demonstrations
+from lfgp_dmc.data import demonstrations, files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.launch import sizes
 from lfgp_dmc.launch.command import UserError
@@ -41,7 +41,8 @@ def load(
   if not folder.exists():
     _collect(config)
   try:
-    if not frame_shape and published_examples.is_folder_of_examples(folder):
+    is_ours = bool(frame_shape or files.own(folder, demonstrations.SUFFIX))
+    if not is_ours and published_examples.is_folder_of_examples(folder):
       found = published_examples.read_folder(folder, tasks)
     else:
       found = demonstrations.read_folder(folder, tasks, *widths, frame_shape)

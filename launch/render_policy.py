@@ -74,6 +74,12 @@ _UNTIL = flags.DEFINE_bool(
   "until_success", False, "Stop a second after the task's success."
 )
 
+_USELESS = {
+  "episode": (_ATTEMPTS,),
+  "strips": (_COLLECTION, _GRID, _STEPS, _UNTIL),
+  "reset": (_ATTEMPTS, _EVERY, _STEPS, _STRIP, _UNTIL),
+}
+
 _MOST_CELLS = 100
 _RATE = 20.0  # 50 ms a second
 
@@ -90,6 +96,9 @@ def main() -> None:
     raise UserError("--task goes with --expert: strips show runs' main tasks")
   if _WHAT.value == "reset" and (_RUN.value or _EXPERT.value):
     raise UserError("--what=reset shows the world alone, without an actor")
+  for flag in _USELESS[_WHAT.value]:
+    if flag.present:
+      raise UserError(f"--{flag.name} does nothing with --what={_WHAT.value}")
   if _TASK.value and (_EXPERT.value or _WHAT.value == "reset"):
     command.check_choice("task", _TASK.value, lfgp_dmc.ALL_TASKS)
   look = recorder.Look(

@@ -190,18 +190,21 @@ def _check_source(
     raise ValueError(
       f"config.control_hz is {config.control_hz}; {field} {path} has {rate}"
     )
-  own = config.agent.inputs.tanh_feature_scale
-  options = stored.get(run_folder.POLICY_FIELD, {})
-  scale = options.get("tanh_feature_scale", own)
-  if scale != own:
-    raise ValueError(
-      f"config.agent.inputs.tanh_feature_scale is {own}; {field} {path} has "
-      f"{scale}"
-    )
+  own = dataclasses.asdict(config.agent.inputs)
+  theirs = {
+    **stored.get("agent", {}).get("inputs", {}),
+    **stored.get(run_folder.POLICY_FIELD, {}),
+  }
+  for name, value in own.items():
+    if theirs.get(name, value) != value:
+      raise ValueError(
+        f"config.agent.inputs.{name} is {value}; {field} {path} has "
+        f"{theirs[name]}"
+      )
 
 
 def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
-  """Section 5.2 of the paper: networks by task name, and the whole replay."""
+  """Section 5.3 of the paper: networks by task name, and the whole replay."""
   source = RunFolder(pathlib.Path(config.transfer_from))
   try:
     stored = run_folder.read_config(source.path)

@@ -16,7 +16,7 @@ import gymnasium
 import numpy as np
 
 import lfgp_dmc
-from lfgp_dmc import graphics
+from lfgp_dmc import graphics, seeding
 from lfgp_dmc.acting.environments import TASK_PREFIXES
 from lfgp_dmc.observations import OBSERVATION_SIZE
 
@@ -72,7 +72,8 @@ class BlockEnvironment(DmControlCompatibilityV0):
     """Starts an episode; `options` are the arguments of `reset_to`."""
     gymnasium.Env.reset(self, seed=seed)
     if seed is not None:
-      self._env.reseed(seed)
+      # Gymnasium's may be of any size; ours are of 32 bits.
+      self._env.reseed(seed if seed < 1 << 32 else seeding.derive(seed))
     start = self._env.reset_to if options else self._env.reset
     timestep = start(**(options or {}))
     return self._observed(timestep.observation), self._info(timestep)

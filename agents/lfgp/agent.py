@@ -61,7 +61,7 @@ class LfgpAgent:
     Raises:
       ValueError: it has other sizes, or none of our tasks.
     """
-    self._check_common(policy.tasks, "the policy")
+    self._check_source_tasks(policy.tasks, "the policy")
     transfer.carry(
       self.learner.networks.intentions,
       policy.arrays(),
@@ -80,7 +80,7 @@ class LfgpAgent:
     updates: int = 0,
     main_head: bool = False,
   ) -> None:
-    """Takes over what another agent learned (section 5.2 of the paper).
+    """Takes over what another agent learned (section 5.3 of the paper).
 
     These are `state_dict()["learner"]["networks"]` of that agent.
     Temperatures, optimisers and scheduler stay fresh. If a task is new,
@@ -97,7 +97,7 @@ class LfgpAgent:
       ValueError: its networks have other sizes, or none of our tasks; or its
         main task is another task of ours.
     """
-    self._check_common(source_tasks, "the other run")
+    self._check_source_tasks(source_tasks, "the other run", main_head)
     is_any_new = bool(set(self.tasks) - set(source_tasks))
     if main_head:
       main, *others = source_tasks
@@ -202,7 +202,19 @@ class LfgpAgent:
     self._refresh()
     self._episode_step = 0
 
-  def _check_common(self, source_tasks: Sequence[str], what: str) -> None:
+  def _check_source_tasks(
+    self, source_tasks: Sequence[str], what: str, main_head: bool = False
+  ) -> None:
+    new = [task for task in self.tasks if task not in source_tasks]
+    if main_head and new[:1] == [self.tasks[0]]:
+      del new[0]  # it gets a head under another name
+    is_cloned = self._pretraining.config.updates > 0
+    if new and self.learner.prior is not None and not is_cloned:
+      raise ValueError(
+        f"agent.prior.weight holds intentions near the first ones, and {what} "
+        f"has none of {', '.join(new)}, which would be held at random ones; "
+        "valid: agent.prior.weight=0"
+      )
     if not set(self.tasks) & set(source_tasks):
       raise ValueError(
         f"{what} has none of {', '.join(self.tasks)}; it has: "

@@ -194,6 +194,13 @@ class LfgpConfig:
           f"reward.noise is {reward.noise!r}; valid: 0 unless "
           "inputs.standardise is True (its unit is the standardised input's)"
         )
+      experts = int(reward.expert_share * self.batch_size)
+      if experts == self.batch_size and not reward.intentions_on_experts:
+        yield (
+          f"reward.expert_share is {reward.expert_share!r}; valid: one that "
+          "leaves rows for the intentions, unless "
+          "reward.intentions_on_experts is True"
+        )
     elif isinstance(reward, ExampleReward):
       if self.scheduler.kind == "q_table":
         yield (

@@ -1,6 +1,6 @@
 """What a new agent takes over from the networks of another, by task name.
 
-Section 5.2 of the paper as the released code does it: trunks whole, heads of
+Section 5.3 of the paper as the released code does it: trunks whole, heads of
 the tasks that both have, the discriminator's hidden layers and its output
 weights of those tasks (not their biases). Heads of new tasks stay random.
 """

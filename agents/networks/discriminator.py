@@ -30,11 +30,17 @@ class Discriminator(FlatModule):
     inputs: str = "state_action",
     masked: Sequence[int] = (),
   ):
-    """Sees "state_action" (paper) or "state", but the `masked` of O floats."""
+    """Sees "state_action" (paper) or "state", but the `masked` of O floats.
+
+    Raises:
+      ValueError: that is nothing.
+    """
     super().__init__()
     self.sees_action = inputs == "state_action"
     self.selection = Selection(observations, masked)
     size = self.selection.size + (actions if self.sees_action else 0)
+    if not size:
+      raise ValueError("a discriminator's masked slices hide all that it sees")
     self.first = make_linear(size, hidden, generator)
     self.second = make_linear(hidden, hidden, generator)
     self.output = make_linear(hidden, tasks, generator)

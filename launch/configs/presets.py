@@ -7,8 +7,9 @@ with another kind, those changes are left out.
 
 from typing import Any
 
-# The authors' later journal version. Its data, 1000 pairs a task of which 200
-# are extra rows of success, is a matter of collection:
+# The authors' later journal version; of cloning it changes nothing but the
+# weight decay. Its data, 1000 pairs a task of which 200 are extra rows of
+# success, is a matter of collection:
 #   python launch/collect_demonstrations.py --task=stack --pairs_per_task=800 \
 #       --final_pairs=200 --output=data/stack_ral
 # It trains for 2 M steps, Insert for 4 M: --config.env_steps=2000000.

@@ -112,6 +112,11 @@ class RunConfig:
       )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
+    if self.environment and self.camera_size:
+      yield (
+        f"camera_size is {self.camera_size}; valid: 0 with environment (which "
+        "has its own cameras)"
+      )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"
@@ -167,9 +172,13 @@ class RunConfig:
         "agent.pretraining.updates, init_from or transfer_from (the intentions "
         "would be held at random ones)"
       )
+    if self.transfer_main_head and not self.transfer_from:
+      yield "transfer_main_head is True; valid: False without transfer_from"
     if not self.init_from:
       return
     valid = f"init_from is {self.init_from!r}; valid: nothing"
+    if self.transfer_from:
+      yield f"{valid} with transfer_from, which brings intentions"
     if not isinstance(agent, LfgpConfig):
       yield f"{valid} with {self.algorithm}"
     elif agent.pretraining.updates:

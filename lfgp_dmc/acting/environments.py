@@ -24,7 +24,7 @@ TASK_PREFIXES = (
   observations.REWARD_PREFIX,
 )
 
-_FEATURES = "features"
+_FEATURES = "encoded frames"
 
 Flattener = Callable[[Any], np.ndarray]
 
@@ -40,8 +40,10 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   if not all(isinstance(part, specs.Array) for part in parts):
     raise ValueError(f"observations are {spec}; valid: an array, or named ones")
   if not isinstance(spec, Mapping):
-    return lambda observation: np.asarray(observation, np.float32).ravel()
-  if observations.OBSERVATION_SLICES.keys() <= spec.keys():
+    # A copy: some environments fill one array again and again.
+    return lambda observation: np.array(observation, np.float32).ravel()
+  frames = list(filter(is_frame, spec))
+  if observations.OBSERVATION_SLICES.keys() <= spec.keys() and not frames:
     return observations.flatten
   names = [
     name
@@ -49,7 +51,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
-  names += filter(is_frame, spec)
+  names += frames
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -135,7 +137,7 @@ class _UnitActions(_Wrapped):
 def with_features(
   environment: dm_env.Environment, encode: Callable[[np.ndarray], np.ndarray]
 ) -> dm_env.Environment:
-  """The environment, with the observable `features` in the place of frames.
+  """The environment, with one observable of features in the place of frames.
 
   `encode` maps frames uint8 [N, C, H, W, 3] to float32 [N, F].
   """
@@ -149,9 +151,10 @@ class _Features(_Wrapped):
   def __init__(self, environment: Any, encode):
     super().__init__(environment)
     self._encode = encode
+    self._names = list(filter(is_frame, environment.observation_spec()))
 
   def observation_spec(self) -> dict[str, specs.Array]:
-    """The environment's own, without frames, with `features`."""
+    """The environment's own, with the frames' features instead of them."""
     spec = self._environment.observation_spec()
     frames = np.zeros((1, *frame_shape(self._environment)), np.uint8)
     kept = {name: part for name, part in spec.items() if not is_frame(name)}
@@ -169,7 +172,7 @@ class _Features(_Wrapped):
   def _encoded(self, timestep: dm_env.TimeStep) -> dm_env.TimeStep:
     seen = timestep.observation
     kept = {name: value for name, value in seen.items() if not is_frame(name)}
-    frames = np.stack([value for name, value in seen.items() if is_frame(name)])
+    frames = np.stack([seen[name] for name in self._names])
     kept[_FEATURES] = self._encode(frames[None])[0]
     return timestep._replace(observation=kept)
 

@@ -6,6 +6,7 @@ import contextlib
 import itertools
 import multiprocessing
 import os
+import pickle
 import signal
 import threading
 import traceback
@@ -144,9 +145,21 @@ def _serve(make_state: MakeState, connection: Any) -> None:
         state = make_state() if state is None else state
         answer = True, state(job)
       except Exception as error:  # the parent raises it
-        error.add_note(f"in a worker process:\n{traceback.format_exc()}")
-        answer = False, error
-      connection.send(answer)
+        answer = False, _portable(error)
+      try:
+        connection.send(answer)
+      except (pickle.PicklingError, TypeError, AttributeError) as error:
+        connection.send((False, _portable(error)))
+
+
+def _portable(error: Exception) -> Exception:
+  """The error with its traceback; its text alone, if it does not pickle."""
+  try:
+    pickle.loads(pickle.dumps(error))  # some dump and do not load
+  except Exception:
+    error = RuntimeError("".join(traceback.format_exception_only(error)))
+  error.add_note(f"in a worker process:\n{traceback.format_exc()}")
+  return error
 
 
 def _end_with_parent() -> None:

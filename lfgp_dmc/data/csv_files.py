@@ -74,7 +74,8 @@ def append(
     files.naming(path),
     open(path, "r+", newline="", encoding="utf-8") as file,
   ):
-    found = next(csv.reader([file.readline()]))
+    first = file.readline().removeprefix("\ufeff")
+    found = next(csv.reader([first]))
     if found != list(columns):
       raise ValueError(f"{path} has columns {found}; expected {list(columns)}")
     _cut_torn_line(path)

@@ -148,7 +148,8 @@ def write_folder(path: files.Path, found: Mapping[str, Demonstrations]) -> None:
     for task, data in found.items():
       if pathlib.Path(task).name != task:
         raise DatasetError(f"task is {task!r}; valid: a file's name")
-      write(folder / (task + SUFFIX), data)
+      name = task + SUFFIX
+      files.write_bytes(folder / name, _content(final / name, data))
     if final.exists():
       raise FileExistsError(
         f"{final} exists; datasets are never written into: choose another "
@@ -176,6 +177,19 @@ def write(
     FileExistsError: the file exists.
   """
   path = pathlib.Path(path)
+  content = _content(path, demonstrations, attributes)
+  if path.exists():
+    raise FileExistsError(f"{path} exists; nothing was written")
+  path.parent.mkdir(parents=True, exist_ok=True)
+  files.write_bytes(path, content)
+
+
+def _content(
+  path: pathlib.Path,
+  demonstrations: Demonstrations,
+  attributes: Mapping[str, Any] | None = None,
+) -> bytes:
+  """A file's bytes; raises DatasetError that names where it belongs."""
   attributes = {
     "schema_version": checks.SCHEMA_VERSIONS[demonstrations.frames is not None],
     **(demonstrations.attributes if attributes is None else attributes),
@@ -187,11 +201,7 @@ def write(
   faults += checks.of_arrays(arrays, None, None)
   if faults:
     raise DatasetError(f"{path} not written: {'; '.join(faults)}")
-  if path.exists():
-    raise FileExistsError(f"{path} exists; nothing was written")
-  path.parent.mkdir(parents=True, exist_ok=True)
-  content = frame_files.packed(arrays, attributes, checks.FRAMES)
-  files.write_bytes(path, content)
+  return frame_files.packed(arrays, attributes, checks.FRAMES)
 
 
 def read(
@@ -206,6 +216,7 @@ def read(
   Raises:
     DatasetError: it is missing, damaged or breaks the contract; the message
       is one line that names the file and every fault.
+    OSError: there is no room to unpack frames.
   """
   path = pathlib.Path(path)
   if not path.is_file():
@@ -218,6 +229,8 @@ def read(
     OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError,
     OverflowError, AttributeError,
   ) as error:  # fmt: skip
+    if isinstance(error, OSError) and files.is_lack_of_room(error):
+      raise  # of the folder for temporary files, where frames are unpacked
     detail = " ".join(str(error).split())
     raise DatasetError(f"{path}: not a readable HDF5 file ({detail})") from None
   faults = checks.of_attributes(attributes, task)

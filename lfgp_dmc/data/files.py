@@ -43,6 +43,11 @@ def naming(path: Path) -> Iterator[None]:
     raise
 
 
+def is_lack_of_room(error: OSError) -> bool:
+  """Whether a disk, a quota or a limit of size is at its end."""
+  return error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
 def check_writable(path: Path) -> None:
   """Raises OSError if a file cannot be written there; makes and alters none.
 
@@ -97,7 +102,7 @@ def write_bytes(path: Path, content: bytes) -> None:
     with replacing(path) as aside:
       aside.write_bytes(content)
   except OSError as error:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
+    if is_lack_of_room(error):
       size = f"it needs {len(content) / 1e6:.3g} MB"
       error.strerror = f"{error.strerror}; {size}"
     raise

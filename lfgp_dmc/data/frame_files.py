@@ -9,6 +9,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from lfgp_dmc.data import files
+
 _BLOCK = 16  # rows that are compressed together
 
 
@@ -28,14 +30,16 @@ class FrameFile:
     """Appends rows, uint8 [n, C, H, W, 3].
 
     Raises:
-      OSError: the disk is full.
+      OSError: the disk is full; names TMPDIR's folder.
     """
-    self._file.write(np.ascontiguousarray(frames, np.uint8).data)
+    with files.naming(tempfile.gettempdir()):
+      self._file.write(np.ascontiguousarray(frames, np.uint8).data)
     self._rows += len(frames)
 
   def mapped(self) -> np.ndarray:
     """All rows so far, uint8 [N, C, H, W, 3], read-only."""
-    self._file.flush()
+    with files.naming(tempfile.gettempdir()):
+      self._file.flush()
     shape = (self._rows, *self._shape)
     return np.memmap(self._file, np.uint8, "r", shape=shape)
 

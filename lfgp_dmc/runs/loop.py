@@ -74,7 +74,9 @@ class EpisodeRounds(Rounds[ActingAgent]):
       self._bar.update()
       if progress.env_step % schedule.log_every == 0:
         self._write_row()
-    if step.timestep.last() and not failed:
+    if not step.timestep.last():
+      progress.cut_episodes += 1
+    elif not failed:
       progress.episodes += 1
       self._agent.end_episode(_episode(episode, rewards))
     progress.is_complete = progress.env_step == schedule.env_steps
@@ -85,6 +87,7 @@ class EpisodeRounds(Rounds[ActingAgent]):
     """The next episode; each of its actions knows of all updates."""
     progress = self.progress
     number = progress.episodes + progress.physics_failures
+    number += progress.cut_episodes  # as of a run that goes on past its end
     if hasattr(self._environment, "reseed"):
       seed = seeding.derive(self._seed, "training episode", number)
       self._environment.reseed(seed)

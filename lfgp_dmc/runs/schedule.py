@@ -38,6 +38,7 @@ class Progress:
   update: int = 0
   episodes: int = 0  # complete ones
   physics_failures: int = 0  # episodes dropped
+  cut_episodes: int = 0  # by the end of a run that went on later
   wall_s: float = 0.0
   update_credit: float = 0.0  # the fraction of an update that is due
   is_complete: bool = False  # reached its end, which may come early in BC

@@ -64,6 +64,10 @@ class LfgpConfigTest(parameterized.TestCase):
     ("expert_share", {"reward.kind": "stored", "reward.expert_share": 0.1}),
     ("phi", {"scheduler.phi": 0.5}),
     (
+      "expert_share is 1.0; valid: one that leaves rows",
+      {"reward.expert_share": 1.0, "reward.intentions_on_experts": False},
+    ),
+    (
       "what critic.masked .3:6. leaves",
       {
         "networks.layout": "separate",

@@ -137,6 +137,17 @@ class InitFromTest(parameterized.TestCase):
     agent.prepare()
     agent.update()
 
+  def test_a_prior_that_is_random_for_new_tasks_is_refused(self):
+    policy, own = _agent(("reach", "bring"), 1, **_OWN).policy, _OWN
+    prior = {**own, "prior.weight": 1.0}
+    with self.assertRaisesRegex(ValueError, "none of stack, move_object, lift"):
+      _agent(NEW, **prior).start_from(policy)
+    source = _networks(_trained(**own))
+    with self.assertRaisesRegex(ValueError, "prior.*none of lift, which would"):
+      _agent(NEW, **prior).carry_over(source, OLD, main_head=True)
+    _agent(OLD, **prior).carry_over(source, OLD)
+    _agent(NEW, **prior, **{"pretraining.updates": 1}).start_from(policy)
+
   def test_other_sizes_and_tasks_are_refused(self):
     agent = _agent(NEW, **_OWN)
     with self.assertRaisesRegex(ValueError, "the policy has none of stack"):

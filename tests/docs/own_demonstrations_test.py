@@ -120,6 +120,11 @@ class OwnDemonstrationsTest(fixtures.FolderTest):
     for line, message in (
       ("--dataset=empty", "empty/TASK.hdf5: missing"),
       ("--dataset=empty --task=lift", "lift.hdf5: missing"),
+      (
+        "--dataset=data/mine --environment=lfgp_dmc.toy:PointEnvironment "
+        "--task=right",
+        "left.hdf5: missing",
+      ),
       ("--dataset=data/mine", "data/mine has several control rates"),
     ):
       with self.subTest(line):

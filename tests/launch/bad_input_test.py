@@ -29,6 +29,14 @@ _BAD = (
   ("render_policy.py --run=a --control_hz=5", "--control_hz goes with --expe"),
   ("render_policy.py --run=a --what=reset", "--what=reset shows the world"),
   ("render_policy.py --run=a --what=strips --task=lift", "--task goes with"),
+  (
+    "render_policy.py --expert=scripted --what=strips --grid=2x2",
+    "--grid does nothing with --what=strips",
+  ),
+  (
+    "render_policy.py --what=reset --until_success",
+    "--until_success does nothing with --what=reset",
+  ),
   ("render_policy.py --expert=scripted --height=99999", "4320"),
   ("render_policy.py --expert=scripted --output=a.avi", "valid: .mp4, .gif,"),
   (
@@ -59,6 +67,10 @@ _BAD = (
     "check_demonstrations.py --dataset=no --environment=no:thing",
     "No module named 'no'",
   ),
+  (
+    "check_demonstrations.py --dataset=no --environment=a:b --camera_size=64",
+    "--camera_size is of the block tasks",
+  ),
   ("demo.py --stored=missing", "no run folder missing"),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )
@@ -75,7 +87,8 @@ _COLLECTION = (
   ("--output=new --keep_longest_of=0", "0 is not a positive integer"),
   ("--output=new --keep_longest_of=2 --collection=play", "valid: 1 with"),
   ("--output=new --control_hz=7", "--control_hz=7 is unknown; valid: 20, 10"),
-  ("--output=new --seed=-1", "-1 is not a non-negative integer"),
+  ("--output=new --seed=-1", "-1 is not an integer in the range [0, 9223372"),
+  (f"--output=new --seed={1 << 64}", "is not an integer in the range"),
   ("--output=new --workers=-1", "-1 is not a non-negative integer"),
   ("--output=new --expert=no/run", "no run folder no/run"),
   ("", "--output is not set"),

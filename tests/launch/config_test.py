@@ -146,6 +146,15 @@ class ConfigTest(parameterized.TestCase):
       "config.agent.networks.actor_trunk is 'shared'; valid: own",
     ),
     ("--config.environment=toy", "config.environment is 'toy'; valid"),
+    (
+      "--config.environment=a:b --config.camera_size=64",
+      "config.camera_size is 64; valid: 0 with environment",
+    ),
+    ("--config.transfer_main_head", "valid: False without transfer_from"),
+    (
+      "--config.init_from=a --config.transfer_from=b",
+      "config.init_from is 'a'; valid: nothing with transfer_from",
+    ),
     ("--config.control_hz=7", "config.control_hz is 7; valid: 20, 10, 5"),
     ("--config.init_from=a", "config.init_from is 'a'; valid: nothing, unl"),
     (

@@ -80,3 +80,6 @@ class DatasetsTest(fixtures.RunTest):
     self.assertLen(shown["lift"], 50)
     with self.assertRaisesRegex(UserError, "stack.npz: missing"):
       datasets.load(config, ["lift", "stack"], (59, 4))
+    (folder / "reach.hdf5").touch()  # files of ours count alone
+    with self.assertRaisesRegex(UserError, "lift.hdf5: missing"):
+      datasets.load(config, ["lift", "stack"], (59, 4))

@@ -13,6 +13,7 @@ from lfgp_dmc.acting.attempts import CollectionPlan, Collector
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import demonstrations, evaluation_csv
 from lfgp_dmc.data.replay import Replay
+from lfgp_dmc.launch import datasets
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from tests import fixtures as shared
@@ -117,6 +118,15 @@ class PixelsTest(fixtures.RunTest):
     blind, _ = self.train(super().config(algorithm="bc", env_steps=5), "blind")
     with self.assertRaisesRegex(UserError, "blind sees no pixels"):
       self.train(self.config("dac", init_from=str(blind)))
+    clone, _ = self.train(self.config("multitask_bc", env_steps=5), "clone")
+    with (
+      mock.patch.object(
+        environments, "frame_shape", lambda _: (2, *_SHAPE[1:])
+      ),
+      mock.patch.object(datasets, "load"),
+      self.assertRaisesRegex(UserError, r"sees frames \[1, .* has \[2, 32"),
+    ):
+      self.train(self.config("dac", init_from=str(clone)))
     with self.assertRaisesRegex(UserError, "has no frames"):
       self.train(self.config("bc", demonstrations=str(self.dataset)))
     self.assertFalse((self.folder / "runs" / "a").exists())

@@ -235,15 +235,20 @@ class InitFromTest(_RunTest):
     with self.assertRaisesRegex(UserError, "no policy in .*data"):
       self.train(wrong, "b")
 
-  def test_inputs_of_another_scale_are_refused(self):
+  def test_inputs_that_mean_something_else_are_refused(self):
     scale = "agent.inputs.tanh_feature_scale"
     source, _ = self.train(self.config(env_steps=20, **{scale: 0.1}), "source")
-    config = self.config(
-      init_from=str(source),
-      **{scale: 0.2, "agent.networks.actor_trunk": "own"},
-    )
-    with self.assertRaisesRegex(UserError, f"{scale} is 0.2; init_from .* 0.1"):
-      self.train(config)
+    standardise = "agent.inputs.standardise"
+    for changes, message in (
+      ({scale: 0.2}, f"{scale} is 0.2; init_from .* 0.1"),
+      ({scale: 0.1, standardise: True}, f"{standardise} is True; .* False"),
+    ):
+      config = self.config(
+        init_from=str(source),
+        **{"agent.networks.actor_trunk": "own", **changes},
+      )
+      with self.assertRaisesRegex(UserError, message):
+        self.train(config)
 
 
 class ExamplesTest(_RunTest):

@@ -63,6 +63,9 @@ class GymnasiumTest(parameterized.TestCase):
     self.assertFalse(np.array_equal(*again))
     first = [env.reset(seed=9)[0] for _ in range(2)]
     np.testing.assert_array_equal(*first)
+    large = [env.reset(seed=(1 << 32) + k)[0] for k in (0, 1, 0)]
+    np.testing.assert_array_equal(large[0], large[2])
+    self.assertFalse(np.array_equal(large[0], large[1]))
     env.close()
 
   def test_steps_environments_side_by_side(self):

@@ -1,10 +1,10 @@
 """Foreign environments are driven by their own specs, or refused."""
 
 import numpy as np
-from absl.testing import parameterized
+from absl.testing import absltest, parameterized
 from dm_env import specs
 
-from lfgp_dmc import toy
+from lfgp_dmc import observations, toy
 from lfgp_dmc.acting import environments
 
 
@@ -70,3 +70,55 @@ class UnitActionsTest(parameterized.TestCase):
       environments.widths(
         _Foreign(specs.BoundedArray((2,), float, -1, 1), spec)
       )
+
+
+class _Cameras(toy.PointEnvironment):
+  """Gives its two cameras in another order than its specification."""
+
+  def observation_spec(self):
+    frame = specs.Array((4, 4, 3), np.uint8)
+    return {
+      **super().observation_spec(), "camera/a": frame, "camera/b": frame
+    }  # fmt: skip
+
+  def _observe(self):
+    frames = {f"camera/{k}": np.full((4, 4, 3), n, np.uint8)
+              for k, n in (("b", 2), ("a", 1))}  # fmt: skip
+    return {**frames, **super()._observe()}
+
+
+class FlattenerTest(absltest.TestCase):
+  def test_an_array_that_is_filled_again_is_copied(self):
+    reused = np.zeros(2, np.float32)
+    spec = specs.Array((2,), np.float32)
+    foreign = _Foreign(specs.BoundedArray((2,), float, -1, 1), spec)
+    before = environments.flattener(foreign)(reused)
+    reused += 1
+    np.testing.assert_array_equal(before, [0, 0])
+
+  def test_cameras_are_in_the_order_of_the_specification(self):
+    flat = environments.flattener(_Cameras())(_Cameras().reset().observation)
+    np.testing.assert_array_equal(flat[2::48], [1, 2])
+
+    def encode(frames):
+      return frames[:, :, 0, 0, 0].astype(np.float32)
+
+    encoded = environments.with_features(_Cameras(), encode)
+    observed = encoded.reset().observation
+    flat = environments.flattener(encoded)(observed)
+    np.testing.assert_array_equal(flat[2:], [1, 2])
+
+  def test_all_block_components_beside_cameras_keep_the_frames(self):
+    frame = specs.Array((4, 4, 3), np.uint8)
+    parts = {
+      name: specs.Array((part.size,), np.float32)
+      for name, part in observations.OBSERVATION_SLICES.items()
+    }
+    foreign = _Foreign(
+      specs.BoundedArray((2,), float, -1, 1), {**parts, "camera/a": frame}
+    )
+    self.assertEqual(environments.widths(foreign), (59, 2))
+    observed = {
+      k: np.zeros(v.shape) for k, v in foreign._observation_spec.items()
+    }
+    self.assertLen(environments.flattener(foreign)(observed), 59 + 48)

@@ -97,6 +97,9 @@ class FilesTest(FolderTest):
       lines[0], "env_step,task,episode,seed,success,steps_to_success,return"
     )
     self.assertEqual(lines[2], "1000,right,1,7,0,,0.1")
+    path.write_text("\ufeff" + path.read_text())  # as spreadsheets do
+    evaluation_csv.append_csv(path, _ROWS[:1])
+    self.assertLen(evaluation_csv.read_csv(path), len(_ROWS) + 2)
 
   def test_another_csv_is_refused(self):
     path = self.folder / "a.csv"

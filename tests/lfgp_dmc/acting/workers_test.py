@@ -14,12 +14,23 @@ from lfgp_dmc.acting import workers
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
+class _StubbornError(Exception):
+  """Is pickled, and cannot be unpickled."""
+
+  def __init__(self, what, why):
+    super().__init__(f"{what}: {why}")
+
+
 class _Player:
   """Does a job: squares it, raises, waits or dies."""
 
   def __call__(self, job):
     if job == "fail":
       raise ValueError("no such job")
+    if job == "fail in a special way":
+      raise _StubbornError("gripper", "stuck")
+    if job == "give what cannot be sent":
+      return threading.Lock()
     if job == "wait":
       time.sleep(60)
     if job == "die":
@@ -55,6 +66,15 @@ class WorkersTest(absltest.TestCase):
       workers.LostWorkerError, "was killed, as by the kernel"
     ):
       list(workers.ordered(_Player, [1, "die", 2], 2))
+
+  def test_what_cannot_be_sent_is_told_as_text(self):
+    for job, message in (
+      ("fail in a special way", "_StubbornError: gripper: stuck"),
+      ("give what cannot be sent", "cannot pickle '_thread.lock' object"),
+    ):
+      with self.assertRaisesRegex(Exception, message) as raised:
+        list(workers.ordered(_Player, [1, job, 2], 2))
+      self.assertIn("in a worker process", raised.exception.__notes__[0])
 
   def test_closing_ends_busy_workers_at_once(self):
     results = workers.ordered(_Player, [1, "wait", "wait", "wait"], 2)

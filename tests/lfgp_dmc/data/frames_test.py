@@ -1,6 +1,7 @@
 """Demonstrations with frames: each stored once, checked, and left on disk."""
 
 import dataclasses
+import tempfile
 
 import h5py
 import numpy as np
@@ -63,6 +64,14 @@ class FramesTest(fixtures.FolderTest):
     with h5py.File(self._path, "r+") as file:
       del file["frames"]
     with self.assertRaisesRegex(DatasetError, "has no frames; valid"):
+      demonstrations.read(self._path, "reach", 5, 2, _SHAPE)
+
+  def test_a_full_disk_for_temporary_files_is_no_fault_of_the_data(self):
+    self._write()
+    with (
+      fixtures.full_disk(),
+      self.assertRaisesRegex(OSError, f"too large: '{tempfile.gettempdir()}'"),
+    ):
       demonstrations.read(self._path, "reach", 5, 2, _SHAPE)
 
   def test_a_flipped_bit_is_found(self):

@@ -116,7 +116,10 @@ class MinariTest(fixtures.FolderTest):
     (ours / "stack.hdf5").unlink()
     for arguments, said in (
       ("--dataset=ours", "lfgp_dmc/b/reach-v0"),
-      ("--dataset=new --back --attributes=expert=me,seed=9", "new/reach.hdf5"),
+      (
+        "--dataset=new --back --attributes=expert=me,seed=9,control_hz=12.5",
+        "new/reach.hdf5",
+      ),
     ):
       line = f"convert_minari.py --minari=lfgp_dmc/b {arguments}"
       done = launch_fixtures.call(line, self.folder)
@@ -124,5 +127,7 @@ class MinariTest(fixtures.FolderTest):
       self.assertIn(said, done.stdout)
     back = demonstrations.read(self.folder / "new" / "reach.hdf5", "reach")
     self.assertLen(back, 11)
-    self.assertEqual((back.attributes["expert"], back.attributes["seed"]),
-                     ("me", 9))  # fmt: skip
+    found = [back.attributes[k] for k in ("expert", "seed", "control_hz")]
+    self.assertEqual(found, ["me", 9, 12.5])
+    done = launch_fixtures.call(f"{line},seed=x", self.folder)
+    self.assertIn("--attributes=seed=x: invalid literal", done.stderr)

@@ -1,5 +1,6 @@
 """The training loop on the toy world with a toy agent."""
 
+import dataclasses
 import os
 import signal
 from unittest import mock
@@ -233,6 +234,16 @@ class LoopTest(fixtures.FolderTest, parameterized.TestCase):
     self.assertIn("nothing is stored", logs.output[-1])
     self.assertEqual((progress.env_step, self._saved), (0, []))
     self.assertEqual(self._evaluated, [])
+
+  def test_a_longer_run_does_not_begin_with_the_episode_that_was_cut(self):
+    agent = _Agent()
+    progress = self._train(agent, env_steps=50, random_steps=90)
+    cut = self._replay.gather(np.arange(40, 50))
+    longer = dataclasses.replace(progress, is_complete=False)
+    progress = self._train(_Agent(), progress=longer, random_steps=90)
+    self.assertEqual(progress.episodes, 4)
+    after = self._replay.gather(np.arange(10))
+    self.assertFalse(np.array_equal(cut.action, after.action))
 
   def test_a_finished_run_is_left_alone(self):
     self._train(_Agent(), progress=Progress(env_step=100))
