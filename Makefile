@@ -21,7 +21,7 @@ $(STAMP): pyproject.toml constraints.txt
 	@test -x $(BIN)/python || $(PYTHON) -c 'import sys; \
 	sys.exit(not (3, 11) <= sys.version_info < (3, 13))' || { \
 	echo "error: needs Python 3.11 or 3.12; make setup PYTHON=..." >&2; exit 1; }
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install $(TORCH_OPTIONS) -c constraints.txt torch
 	$(BIN)/python -m pip install -c constraints.txt -e '.[dev]'
 	$(BIN)/python launch/set_up_graphics.py

@@ -68,6 +68,18 @@ _SECONDS = flags.DEFINE_float(
 _OUTPUT = flags.DEFINE_string("output", "", "Also a CSV file.")
 
 
+_USED = {  # of these flags, and whether the config is
+  "bars": ((_STEPS, _SECONDS), False),
+  "presets": ((_SECONDS,), False),
+  "environment": ((_STEPS, _SEED), True),
+  "learner": ((_SECONDS,), True),
+  "training": ((_STEPS, _SECONDS), True),
+  "acting": ((_STEPS,), True),
+  "memory": ((_STEPS,), True),
+  "stability": ((_TASKS, _STEPS, _SEED), False),
+}
+
+
 def main() -> None:
   """Measures, prints, and writes the CSV file of `--output`."""
   for task in _TASKS.value:
@@ -79,6 +91,7 @@ def main() -> None:
     files.check_writable(output)
   with command.checked_input():
     config = config_flags.resolved()
+  _check_flags(config)
   rows = []
   machine = ("machine", f"{_processor()}; {command.cores()} cores")
   for row in itertools.chain([machine], _measurements(config)):
@@ -88,6 +101,26 @@ def main() -> None:
   if output:
     output.parent.mkdir(parents=True, exist_ok=True)
     csv_files.write(output, list(rows[-1]), rows)
+
+
+def _check_flags(config: configs.RunConfig) -> None:
+  """Raises UserError for what would be ignored or cannot be measured."""
+  what = _WHAT.value
+  used, is_of_config = _USED[what]
+  known = {flag.name for flag in used}  # flags themselves have no ==
+  given = (_STEPS, _TASKS, _SEED, _SECONDS)
+  useless = [f.name for f in given if f.present and f.name not in known]
+  if not is_of_config:
+    useless += config_flags.given()
+  if useless:
+    raise UserError(f"--{useless[0]} does nothing with --what={what}")
+  if config.environment or config.camera_size:
+    raise UserError("benchmarks are of the block tasks and their 59 floats")
+  is_cloning = configs.ALGORITHMS[config.algorithm].is_supervised
+  if is_cloning and what != "environment":
+    raise UserError(
+      f"--config.algorithm={config.algorithm} does not act; valid: what does"
+    )
 
 
 def _text(value: float) -> str:

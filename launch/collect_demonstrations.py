@@ -146,11 +146,11 @@ def _plan() -> CollectionPlan:
   options: dict[str, Any] = {"control_hz": _HERTZ.value}
   shape: tuple[int, ...] = ()
   if _CAMERA.value:
-    # A policy from pixels is to see no more; other experts need the state.
-    shown = "vision" if seen else "all"
-    options |= {"observations": shown, "camera_size": _CAMERA.value}
+    options |= {"observations": "vision", "camera_size": _CAMERA.value}
     with command.checked_input():
       shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
+    if not seen:  # other experts than policies from pixels need the state
+      options["observations"] = "all"
   return CollectionPlan(
     functools.partial(lfgp_dmc.load, **options),
     make_actor,

@@ -91,6 +91,13 @@ def resumed(stored: Mapping[str, Any]) -> configs.RunConfig:
   return configs.from_dict(config.to_dict())
 
 
+def given() -> list[str]:
+  """The names of what is set: the preset, and config fields."""
+  values = config_flags.get_override_values(flags.FLAGS["config"])
+  preset = ["preset"] if flags.FLAGS["preset"].present else []
+  return [*preset, *(f"config.{name}" for name in values)]
+
+
 def _name(argument: str) -> str:
   return argument.lstrip("-").partition("=")[0] if argument[:1] == "-" else ""
 

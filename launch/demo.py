@@ -168,6 +168,11 @@ def _stored_policy(main_task: str) -> policies.PolicySpec | None:
       f"--stored={folder} cannot do {main_task}; it can do: "
       f"{', '.join(spec.tasks)}"
     )
+  if spec.environment_spec.may_draw:
+    raise command.UserError(
+      f"--stored={folder} sees pixels or acts elsewhere; valid: a policy of "
+      "the block tasks' 59 floats"
+    )
   return spec
 
 

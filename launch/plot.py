@@ -83,6 +83,10 @@ def main() -> None:
   ):  # fmt: skip
     if flag.present and not of.value:
       raise command.UserError(f"--{flag.name} goes with --{of.name}")
+  if _ESTIMATE.present and _FIGURE.value == _EACH:
+    raise command.UserError(
+      f"--estimate goes with --figure={'|'.join(figures.FIGURES)}"
+    )
   with command.checked_input():
     if _RUN.value:
       _draw_one()

@@ -131,7 +131,7 @@ def _film(look: recorder.Look, seeds: Sequence[int], columns: int) -> None:
     clips.play(spec, task, seed, look, is_play, **limits) for seed in seeds
   ]
   shown = [
-    {"seed": seed, **clip.summary(look)}
+    {"seed": seed, **clip.summary()}
     for seed, clip in zip(seeds, played, strict=True)
   ]
   metadata = {

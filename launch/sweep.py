@@ -113,7 +113,7 @@ def _jobs(runs: pathlib.Path) -> list[Job]:
       _TRAIN.value,
       pathlib.Path(_FLAGFILES.value),
     )
-    sweep_jobs.chain(jobs, _STARTS.value)
+    sweep_jobs.chain(jobs, _STARTS.value, runs / sweep_jobs.INDEX_NAME)
   return jobs
 
 

@@ -4,6 +4,7 @@ A run is named after its flagfile, main task and seed: `lfgp_stack_0` is
 `launch/flags/lfgp.flags` with `--config.main_task=stack --config.seed=0`.
 """
 
+import contextlib
 import csv
 import dataclasses
 import math
@@ -20,6 +21,7 @@ COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
            "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
 
 _STEPS = "--config.env_steps="
+_OF_TASK = tuple(f"_{task}" for task in ALL_TASKS)
 _MAY_CHANGE = ("--config.demonstrations=", "--config.evaluation_workers=")
 _ENDLESS = 1 << 62
 
@@ -54,7 +56,7 @@ class Job:
   def steps(self) -> int:
     """How long its arguments let it be; 0: they do not say."""
     given = [a.removeprefix(_STEPS) for a in self.arguments if _STEPS in a]
-    return int(given[-1]) if given and given[-1].isdecimal() else 0
+    return _number(given[-1]) if given else 0
 
   def _resumed_arguments(self) -> list[str]:
     """What a run that goes on takes: all else is as it was started."""
@@ -121,7 +123,9 @@ def make_jobs(
           flags / f"{stem}.flags",
           tuple(
             # No format(): other braces are the argument's own.
-            argument.replace("{runs}", str(runs)).replace("{seed}", str(seed))
+            _with_two_dashes(argument)
+            .replace("{runs}", str(runs))
+            .replace("{seed}", str(seed))
             for argument in arguments
           ),
         )
@@ -129,6 +133,19 @@ def make_jobs(
           job.state = MISSING
         jobs.setdefault(job.name, job)
   return [*jobs.values()]
+
+
+def _with_two_dashes(argument: str) -> str:
+  """As train.py takes it with one, too."""
+  return f"--{argument.lstrip('-')}" if argument[:1] == "-" else argument
+
+
+def _number(text: str) -> int:
+  """As a flag's; 0: train.py will say that it is none."""
+  with contextlib.suppress(ValueError):
+    is_decimal = text.lstrip("+-0")[:1] not in ("x", "X", "o", "O")
+    return int(text, 10 if is_decimal else 0)
+  return 0
 
 
 def _split(
@@ -141,22 +158,33 @@ def _split(
   return algorithm, main_tasks
 
 
-def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
+def chain(
+  jobs: Sequence[Job], starts: Sequence[str], index: pathlib.Path | None = None
+) -> None:
   """Says which runs start from which, by `TARGET:SOURCE:FIELD`.
 
   Such as `lfgp_transfer_stack:lfgp_move_object:config.transfer_from`: that
   run of a seed waits for the source's of the same seed, and gets its folder as
-  that field.
+  that field. Sources that are no jobs are done by their evaluation or by the
+  index of earlier sweeps. Targets that are none are left alone: a sweep may be
+  a part of another.
 
   Raises:
-    ValueError: not of that form.
+    ValueError: not of that form; or the index is no sweep's.
   """
-  known = {job.name: job for job in jobs}
+  known = {job.name for job in jobs}
+  if index is not None:
+    known |= {r["name"] for r in _rows_of(index) if r["state"] == DONE}
+  tasks = {f"_{job.main_task}" for job in jobs}
   for start in starts:
     parts = start.split(":")
     if len(parts) != 3 or not all(parts):
       raise ValueError(f"{start!r}; valid: TARGET:SOURCE:config.FIELD")
     target, source, field = parts
+    if not target.endswith((*_OF_TASK, *tasks)):
+      raise ValueError(
+        f"{start!r}; valid: a TARGET with its task, such as lfgp_stack"
+      )
     for job in jobs:
       if job.name != f"{target}_{job.seed}":
         continue
@@ -170,12 +198,7 @@ def chain(jobs: Sequence[Job], starts: Sequence[str]) -> None:
 
 def recall(jobs: Sequence[Job], index: pathlib.Path) -> None:
   """Takes over what an earlier sweep knew, and finds what is done."""
-  earlier = {}
-  if index.is_file():
-    columns, rows = csv_files.read(index)
-    if columns != list(COLUMNS):
-      raise ValueError(f"{index} is no sweep's: its columns are {columns}")
-    earlier = {row["name"]: row for row in rows}
+  earlier = {row["name"]: row for row in _rows_of(index)}
   for job in jobs:
     row = earlier.get(job.name)
     if row is not None and row["wall_s"]:
@@ -189,8 +212,9 @@ def recall(jobs: Sequence[Job], index: pathlib.Path) -> None:
 
 
 def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
-  """Writes a row a run, whole or not at all."""
-  rows = []
+  """Writes a row a run, whole or not at all; other sweeps' rows stay."""
+  own = {job.name for job in jobs}
+  rows: list[dict] = [r for r in _rows_of(index) if r["name"] not in own]
   for job in jobs:
     step, success = _last_success(job.folder)
     found = {
@@ -202,6 +226,16 @@ def write_index(jobs: Sequence[Job], index: pathlib.Path) -> None:
       {k: found[k] if k in found else getattr(job, k) for k in COLUMNS}
     )
   csv_files.write(index, COLUMNS, rows)
+
+
+def _rows_of(index: pathlib.Path) -> list[dict[str, str]]:
+  """What earlier sweeps wrote; raises ValueError if they did not."""
+  if not index.is_file():
+    return []
+  columns, rows = csv_files.read(index)
+  if columns != list(COLUMNS):
+    raise ValueError(f"{index} is no sweep's: its columns are {columns}")
+  return rows
 
 
 def _steps_of(folder: pathlib.Path) -> int:

@@ -27,7 +27,9 @@ _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
 _EXPERT = flags.DEFINE_enum(
   "expert", None, [policies.SCRIPTED], "Instead of --run."
 )
-_SEED = flags.DEFINE_integer("seed", 0, "Of the resets and the actor.")
+_SEED = flags.DEFINE_integer(
+  "seed", 0, "Of the resets and the actor.", 0, 2**32 - 1
+)
 
 
 def main() -> None:
@@ -51,6 +53,8 @@ def _open(spec: policies.PolicySpec | None, task: str) -> None:
 
   where = spec.environment_spec if spec else EnvironmentSpec(task)
   environment = where.build(seed=_SEED.value)
+  if not hasattr(environment, "physics"):
+    raise command.UserError(f"{where.environment} has no physics to look at")
   app = application.Application(f"LfGP-DMC: {task}")
   policy = None
   if spec:

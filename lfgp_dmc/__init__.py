@@ -2,7 +2,7 @@
 
     import lfgp_dmc
     policy = lfgp_dmc.load_policy("runs/NAME")
-    environment = lfgp_dmc.load("stack", 0, control_hz=policy.control_hz)
+    environment = lfgp_dmc.load("stack", 0, **policy.load_options)
     timestep = environment.reset()
     action = policy(lfgp_dmc.flatten(timestep.observation))
 
@@ -16,6 +16,7 @@ loads neither a simulator nor torch.
 """
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import dm_env
@@ -80,15 +81,18 @@ class StoredPolicy:
   Attributes:
     intentions: their names, the main task's first.
     intention: the name of the one that acts unless a call names another.
-    control_hz: the control rate that it was trained at, for `load`.
+    load_options: what `load` needs so that the environment is as in training:
+      `control_hz`, and for a policy from pixels `observations`, `camera_size`.
   """
 
-  def __init__(self, policy: Any, intention: str, control_hz: int = 20):
+  def __init__(
+    self, policy: Any, intention: str, load_options: Mapping[str, Any]
+  ):
     """Wraps an `agents.policy.Policy`; `load_policy` does it."""
     self._policy = policy
     self.intentions: tuple[str, ...] = policy.tasks
     self.intention = intention
-    self.control_hz = control_hz
+    self.load_options = dict(load_options)
 
   def __call__(
     self, observation: np.ndarray, intention: str | None = None
@@ -132,6 +136,8 @@ def load_policy(
       f"{', '.join(policy.tasks)}"
     )
   policy.begin(task, seed)
-  return StoredPolicy(
-    policy, task, read_config(run_folder).get("control_hz", 20)
-  )
+  config = read_config(run_folder)
+  options = {"control_hz": config.get("control_hz", 20)}
+  if size := config.get("camera_size", 0):
+    options |= {"observations": "vision", "camera_size": size}
+  return StoredPolicy(policy, task, options)

@@ -8,7 +8,7 @@ frames of all cameras, [C, H, W, 3], as floats 0 to 255.
 """
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -112,7 +112,7 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
   return np.concatenate(parts, dtype=np.float32)[_FLAT]
 
 
-def has_state(observation: Mapping[str, np.ndarray]) -> bool:
+def has_state(observation: Mapping[str, Any]) -> bool:
   """Whether all eleven components are there, the privileged ones too."""
   return OBSERVATION_SLICES.keys() <= observation.keys()
 

@@ -1,7 +1,9 @@
 """The play world as a dm_env environment: Composer, made fast and seedable."""
 
 import math
+import numbers
 from collections.abc import Callable
+from typing import Any
 
 import dm_env
 import numpy as np
@@ -25,11 +27,17 @@ class _OncePerStepUpdater(observation.Updater):
   aggregator or corruptor.
   """
 
+  _is_plain = True
+
   def reset(self, physics, random_state):
     enabled = {k: v for k, v in self._observables.items() if v.enabled}
-    self._is_plain = all(map(_is_plain, enabled.values()))
+    was_plain, self._is_plain = (
+      self._is_plain,
+      all(map(_is_plain, enabled.values())),
+    )
     specified = self._enabled_structure or {}
-    if not self._is_plain or enabled.keys() != specified.keys():
+    is_known = was_plain and enabled.keys() == specified.keys()
+    if not self._is_plain or not is_known:
       super().reset(physics, random_state)  # buffers; the spec is made of them
     self._readers = {
       name: value.observation_callable(physics, random_state)
@@ -60,6 +68,12 @@ def _is_plain(value) -> bool:
   )
 
 
+def check_seed(seed: Any) -> None:
+  """Raises ValueError if it is no integer of 32 bits."""
+  if not isinstance(seed, numbers.Integral) or not 0 <= int(seed) < 1 << 32:
+    raise ValueError(f"seed is {seed!r}; valid: 0 to {(1 << 32) - 1}")
+
+
 class PlayEnvironment(composer.Environment):
   """A `composer.Environment` with seeds and requested starts.
 
@@ -74,6 +88,8 @@ class PlayEnvironment(composer.Environment):
   """
 
   def __init__(self, task: PlayTask, seed: int | None, time_limit: float):
+    if seed is not None:
+      check_seed(seed)
     self._steps = 0
     self._reset_next_step: bool
     self._step_limit: float = math.inf
@@ -161,7 +177,12 @@ class PlayEnvironment(composer.Environment):
     return self.reset()
 
   def reseed(self, seed: int) -> None:
-    """Makes the next reset and all that follows depend on `seed` alone."""
+    """Makes the next reset and all that follows depend on `seed` alone.
+
+    Raises:
+      ValueError: it is no integer of 32 bits.
+    """
+    check_seed(seed)
     self._random_state.seed(seed)
 
   def clear_success(self) -> None:

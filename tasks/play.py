@@ -14,7 +14,7 @@ from lfgp_dmc.tasks import workspace as ws
 from lfgp_dmc.tasks.arena import PlayArena
 from lfgp_dmc.tasks.cameras import Cameras
 from lfgp_dmc.tasks.entities import panda_links
-from lfgp_dmc.tasks.goals import GOALS, terms
+from lfgp_dmc.tasks.goals import GOALS, starts, terms
 from lfgp_dmc.tasks.holds import Holds
 from lfgp_dmc.tasks.world import World
 
@@ -45,6 +45,10 @@ class PlayTask(composer.Task):
   ):
     """Builds the world; `tasks.load` describes and checks the options."""
     self._goal, self._is_dense, self._spawn = GOALS[main_task], is_dense, spawn
+    starts_of_both = (starts.APART, self._goal.start)
+    self._never_done = [
+      name for name in MAIN_TASKS if GOALS[name].start in starts_of_both
+    ]
     self.world = World()
     self._holds = Holds(GOALS)
     self._action = _NO_ACTION
@@ -118,13 +122,14 @@ class PlayTask(composer.Task):
   def _is_fair(self, physics, given: tuple[bool, bool]) -> bool:
     """The robot touches no block but those given.
 
-    If none is given, no main task is done, and nothing is toppled or lost.
+    If none is given, nothing is toppled or lost, and no main task is done, but
+    those that start from another arrangement than this one and the usual.
     """
     touched = self.world.reader.robot_touches(physics)
     if any(map(operator.gt, touched, given)):
       return False
     return any(given) or (
-      not any(self._conditions[name] for name in MAIN_TASKS)
+      not any(self._conditions[name] for name in self._never_done)
       and self._goal.start.is_settled(self._snapshot)
     )
 

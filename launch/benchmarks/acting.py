@@ -26,7 +26,7 @@ def measure(config: RunConfig, episodes: int) -> Iterator[tuple[str, float]]:
     `processes`; `evaluation_s` of `evaluation_episodes`; `collection_s` of
     `collection_pairs`, by the scripted expert; both of all tasks together.
   """
-  tasks, cores = lfgp_dmc.task_set(config.main_task), command.cores()
+  tasks, cores = learner.tasks_of(config), command.cores()
   yield "processes", cores
   with tempfile.TemporaryDirectory() as folder:
     if not config.init_from:

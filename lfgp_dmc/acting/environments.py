@@ -42,8 +42,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
   if not isinstance(spec, Mapping):
     # A copy: some environments fill one array again and again.
     return lambda observation: np.array(observation, np.float32).ravel()
-  frames = list(filter(is_frame, spec))
-  if observations.OBSERVATION_SLICES.keys() <= spec.keys() and not frames:
+  if observations.has_state(spec):
     return observations.flatten
   names = [
     name
@@ -51,7 +50,7 @@ def flattener(environment: dm_env.Environment) -> Flattener:
     if not name.startswith(TASK_PREFIXES)
     and np.issubdtype(part.dtype, np.floating)
   ]
-  names += frames
+  names += filter(is_frame, spec)
   if not names:
     raise ValueError(
       "no floating-point observable to learn from; the environment offers: "
@@ -66,14 +65,17 @@ def flattener(environment: dm_env.Environment) -> Flattener:
 
 
 def frame_shape(environment: dm_env.Environment) -> tuple[int, ...]:
-  """[C, H, W, 3] of the cameras' frames; empty without cameras.
+  """[C, H, W, 3] of the frames that are learned from; empty without.
+
+  Beside all eleven components of the block tasks, frames are not.
 
   Raises:
     ValueError: frames are not uint8 [H, W, 3], or of several sizes.
   """
   spec: Any = environment.observation_spec()
-  names = spec if isinstance(spec, Mapping) else ()
-  found = [spec[name] for name in filter(is_frame, names)]
+  if not isinstance(spec, Mapping) or observations.has_state(spec):
+    return ()
+  found = [spec[name] for name in filter(is_frame, spec)]
   kinds = {(part.shape, np.dtype(part.dtype).name) for part in found}
   if not kinds:
     return ()

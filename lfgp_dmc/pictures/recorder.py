@@ -37,18 +37,16 @@ class Clip:
   """Frames, and what they show."""
 
   frames: list[np.ndarray]
-  labels: list[str]  # the intention of each frame
+  switches: list[tuple[int, str]]  # control step -> the task that acts from it
   first_success: dict[str, int]  # task -> control step
   steps: int
   checks: int = 1  # 50 ms in a control step
 
-  def summary(self, look: Look) -> dict[str, Any]:
+  def summary(self) -> dict[str, Any]:
     """For a sidecar: steps, successes, the step each intention began at."""
-    starts: list[dict[str, Any]] = []
-    for i, label in enumerate(self.labels):
-      if i == 0 or label != self.labels[i - 1]:
-        step = i * look.every // self.checks
-        starts.append({"from_step": step, "intention": label})
+    starts = [
+      {"from_step": step, "intention": task} for step, task in self.switches
+    ]
     return {"steps": self.steps, "first_success": self.first_success,
             "intentions": starts}  # fmt: skip
 
@@ -93,7 +91,7 @@ def record(
       success = clip.first_success.get(until_success_of or "")
       if success and (clip.steps - success + 1) * clip.checks > _TAIL:
         return clip
-    recorder.begin_step()
+    recorder.end()
     return clip
   finally:
     environment.on_check = None
@@ -142,7 +140,13 @@ class _Recorder:
     task = self._choose(self.clip.steps, self.timestep)
     if task != self._task:
       self._task = task
+      self.clip.switches.append((self.clip.steps, task))
       self._actor.begin(task, self._seed + self.clip.steps)
+    self._check = 0
+    self._take()
+
+  def end(self) -> None:
+    """Takes the frame after the last step, where nobody acts."""
     self._check = 0
     self._take(is_last=self.timestep.last())
 
@@ -162,7 +166,6 @@ class _Recorder:
     if look.overlay:
       frame = self._captioned(self._with_insets(frame))
     clip.frames.append(frame)
-    clip.labels.append(self._task)
 
   def _with_insets(self, frame: np.ndarray) -> np.ndarray:
     """What the actor's cameras saw last, along the lower edge."""

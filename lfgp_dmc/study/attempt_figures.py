@@ -67,17 +67,26 @@ def table(points: Sequence[Point], baseline: str = "") -> str:
   """A table in Markdown: methods and attempts, success by main task, hours."""
   tasks = list(dict.fromkeys(point.main_task for point in points))
   header = ["method", "attempts", *map(_title, tasks), "core hours a run"]
-  header.append(f"probability of improvement over {_label(baseline)}")
+  known = {p.main_task for p in points if not math.isnan(p.improvement)}
+  compared = (
+    [ALL] if ALL in known else [task for task in tasks if task in known]
+  )
+  better = f"probability of improvement over {_label(baseline)}"
+  is_plain = ALL in known or len(tasks) == 1
+  header += [
+    better if is_plain else f"{better}, {_title(task)}" for task in compared
+  ]
   lines = [header, ["---"] * len(header)]
   for method, attempts in dict.fromkeys(point[:2] for point in points):
     own = {p.main_task: p for p in points if p[:2] == (method, attempts)}
     cells = [_percent(own[task][4:7]) if task in own else "" for task in tasks]
     hours = np.mean([p.core_hours for task, p in own.items() if task != ALL])
     cells.append("" if math.isnan(hours) else f"{hours:.1f}")
-    cells.append(_percent(own[tasks[-1]][8:]) if tasks[-1] in own else "")
+    cells += [_percent(own[task][8:]) if task in own else ""
+              for task in compared]  # fmt: skip
     lines.append([_label(method), str(attempts), *cells])
-  known = [column for column in zip(*lines, strict=True) if any(column[2:])]
-  rows = zip(*known, strict=True)
+  filled = [column for column in zip(*lines, strict=True) if any(column[2:])]
+  rows = zip(*filled, strict=True)
   return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 

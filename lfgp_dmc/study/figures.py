@@ -80,6 +80,7 @@ def draw(
   elif kind == "iqm" and quantity == run_results.SUCCESS:
     cells[0].append(_ALL)
   lines: Lines = {}
+  notes: list[str] = []
   for cell, method in itertools.product(itertools.chain(*cells), styles):
     strata = [(main, main) for main in MAIN_TASKS] if cell == _ALL else [cell]
     samples = [
@@ -90,6 +91,8 @@ def draw(
     if curve is not None:
       estimate = statistics.ESTIMATORS[kind](curve.scores)
       lines[cell, method] = curve, estimate
+    if cell == _ALL:
+      notes += _left_out(styles[method], samples, curve)
   if not lines:
     raise ValueError(
       f"no run for the figure {name!r}; it shows: {', '.join(styles)}"
@@ -99,7 +102,7 @@ def draw(
   )
   rows = _numbers(lines, kind)
   csv_files.write(f"{os.fspath(output)}.csv", COLUMNS, rows)
-  return _notes(styles, runs)
+  return notes + _notes(styles, runs)
 
 
 def learning_curve(
@@ -139,6 +142,22 @@ def _numbers(lines: Lines, kind: str) -> list[dict[str, Any]]:
     for step, *values in zip(curve.steps, *estimate, strict=True)
   ]  # fmt: skip
   return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+
+
+def _left_out(
+  style: Style,
+  strata: Sequence[tuple[Sequence[Run], str]],
+  curve: run_results.Curve | None,
+) -> list[str]:
+  """What the panel of all tasks lacks of a method that has runs on each."""
+  most = max(len(runs) for runs, _ in strata)
+  if not all(runs for runs, _ in strata):
+    return []  # told otherwise
+  if curve is None:
+    return [f"{style.label} has no seed and step in common of all tasks"]
+  if len(curve.scores) < most:
+    return [f"all four of {style.label}: {len(curve.scores)} of {most} seeds"]
+  return []
 
 
 def _notes(styles: Mapping[str, Style], runs: Sequence[Run]) -> list[str]:

@@ -99,15 +99,17 @@ def curve(
     quantity: "success" (share of episodes) or "return" (mean of episodes).
 
   Returns:
-    The scores at the steps that all runs were evaluated at; None if there is no
-    such step, or tasks differ in their number of seeds.
+    The scores of the seeds that every task has, at the steps that all of them
+    were evaluated at; None if there is no such seed or step.
   """
-  points = [
-    [p for run in runs if (p := _points(run, task, quantity))]
+  by_seed = [
+    {run.seed: p for run in runs if (p := _points(run, task, quantity))}
     for runs, task in strata
   ]
-  if not points[0] or len({len(stratum) for stratum in points}) > 1:
+  seeds = sorted(set.intersection(*map(set, by_seed)))
+  if not seeds:
     return None
+  points = [[found[seed] for seed in seeds] for found in by_seed]
   common = set.intersection(*(set(p) for stratum in points for p in stratum))
   steps = sorted(common)
   scores = [[[p[step] for step in steps] for p in runs] for runs in points]

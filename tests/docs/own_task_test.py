@@ -15,6 +15,14 @@ from tests.launch.fixtures import call
 _PAGE = "own_task.md"
 _FLAGS = pages.ROOT / "launch" / "flags"
 
+# Of ten starts of Stack, from the hand to green.
+_FARTHEST = """
+import lfgp_dmc, numpy as np
+env = lfgp_dmc.load("stack", 0)
+seen = [lfgp_dmc.flatten(env.reset().observation) for _ in range(10)]
+print(max(np.linalg.norm(s[:3] - s[19:22]) for s in seen))
+"""
+
 
 def _write_files(folder: pathlib.Path) -> list[str]:
   """Writes the page's files into `folder`; returns their names."""
@@ -43,9 +51,11 @@ class OwnTaskTest(fixtures.FolderTest):
   def _call(self, line: str) -> str:
     """Runs a command of the page on the code in the test's folder."""
     script, *arguments = line.split()
-    command = self.folder / "launch" / script
+    return self._python(str(self.folder / "launch" / script), *arguments)
+
+  def _python(self, *arguments: str) -> str:
     done = subprocess.run(
-      [sys.executable, command, *arguments],
+      [sys.executable, *arguments],
       cwd=self.folder,
       env={"PYTHONPATH": str(self.folder), "MUJOCO_GL": "off"},
       capture_output=True,
@@ -71,6 +81,8 @@ class OwnTaskTest(fixtures.FolderTest):
     evaluate, collect, train, *_ = pages.commands(_PAGE)
     table = self._call(f"{evaluate} --episodes=2")
     self.assertRegex(table, r"unstack +100.0% +2 ")
+    farthest = float(self._python("-c", _FARTHEST))
+    self.assertGreater(farthest, 0.1)  # m: as without the tenth task
     self._call(f"{collect} --pairs_per_task=60")
     short = "--config.env_steps=3 --config.evaluation_episodes=1"
     self._call(f"{train} {short}")

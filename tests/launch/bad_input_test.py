@@ -10,6 +10,7 @@ from lfgp_dmc.launch import command
 from tests.fixtures import FolderTest
 from tests.launch import fixtures
 
+_POLICIES = pathlib.Path(__file__).parents[2] / "results" / "policies"
 # Script, arguments, what the message says.
 _BAD = (
   ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
@@ -60,6 +61,21 @@ _BAD = (
   ("sweep.py --seeds=a", "--seeds: invalid literal"),
   ("sweep.py --algorithms=sorcery", "none of these runs has a flagfile"),
   ("sweep.py --start_from=a", "valid: TARGET:SOURCE"),
+  ("sweep.py --start_from=lfgp_new:a:config.b", "valid: a TARGET with its tas"),
+  ("plot.py --runs=a --estimate=iqm", "--estimate goes with --figure=main|mul"),
+  (
+    "benchmark.py --what=bars --preset=few",
+    "--preset does nothing with --what=bars",
+  ),
+  (
+    "benchmark.py --what=environment --seconds=9",
+    "--seconds does nothing with --what=environment",
+  ),
+  ("benchmark.py --what=learner --config.algorithm=bc", "bc does not act"),
+  (
+    "benchmark.py --config.environment=lfgp_dmc.toy:PointEnvironment",
+    "benchmarks are of the block tasks",
+  ),
   ("check_demonstrations.py", "--dataset is not set"),
   ("check_demonstrations.py --dataset=no", "no dataset folder no"),
   ("check_demonstrations.py --dataset=no --strip=a.gif", "valid: a new .png"),
@@ -72,6 +88,10 @@ _BAD = (
     "--camera_size is of the block tasks",
   ),
   ("demo.py --stored=missing", "no run folder missing"),
+  (
+    f"demo.py --stored={_POLICIES / 'pixels_stack'}",
+    "valid: a policy of the block tasks' 59 floats",
+  ),
   ("demo.py --preset=quick", "unknown preset 'quick'; valid: paper"),
 )
 _COLLECTION = (

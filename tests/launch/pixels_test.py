@@ -161,15 +161,15 @@ class BlockTaskTest(shared.FolderTest):
 
   def test_collects_clones_evaluates_and_films(self):
     self._call(
-      "collect_demonstrations.py --task=reach --tasks=reach --control_hz=5 "
+      "collect_demonstrations.py --task=lift --tasks=lift --control_hz=5 "
       "--pairs_per_task=12 --camera_size=32 --workers=1 --output=data"
     )
     found = demonstrations.read(
-      self.folder / "data" / "reach.hdf5", "reach", 18, 4, (2, 32, 32, 3)
+      self.folder / "data" / "lift.hdf5", "lift", 18, 4, (2, 32, 32, 3)
     )
     self.assertGreater(np.ptp(found.frames[:, 0]), 100)
     self._call(
-      "train.py --preset=pixels --config.algorithm=bc --config.main_task=reach "
+      "train.py --preset=pixels --config.algorithm=bc --config.main_task=lift "
       "--config.camera_size=32 --config.demonstrations=data --run=run "
       "--config.env_steps=2 --config.evaluation_episodes=1 "
       "--config.evaluation_workers=1 --config.agent.encoder.channels=4"
@@ -177,7 +177,7 @@ class BlockTaskTest(shared.FolderTest):
     table = self._call(
       "evaluate.py --run=run --episodes=1 --seed=7 --workers=1"
     )
-    self.assertIn("reach", table)
+    self.assertIn("lift", table)
     self._call(
       "render_policy.py --run=run --steps=2 --height=64 --width=80 "
       "--output=seen.gif --noshadows"

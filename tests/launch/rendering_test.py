@@ -151,9 +151,10 @@ class RenderingTest(FolderTest):
       mock.patch.object(clips, "scheduled", lambda *_: choices),
     ):
       clip = clips.play(
-        spec, clips.SCHEDULED, 0, Look(32, 32, every=4), max_steps=2
+        spec, clips.SCHEDULED, 0, Look(32, 32, every=4), max_steps=3
       )
-    self.assertEqual(clip.labels, ["reach", "reach", "close_gripper"])
+    self.assertEqual(clip.switches, [(0, "reach"), (2, "close_gripper")])
+    self.assertLen(clip.frames, 4)
     first, *_, last = label.call_args_list
     self.assertEqual(first.args[1:], ("scheduler: reach", "step 0"))
     self.assertEqual(first.kwargs, {"highlight": False})

@@ -174,6 +174,12 @@ class SweepTest(FolderTest):
     )
     row = csv_files.read(index)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
+    sweep_jobs.write_index(self._jobs(("lfgp_new",)), index)
+    self.assertLen(csv_files.read(index)[1], 6)  # theirs stay
+    later = self._jobs(("lfgp",), (1,))
+    start = "lfgp_bring:lfgp_stack:config.init_from"
+    sweep_jobs.chain(later[1:], [start], index)
+    self.assertEqual(later[1].state, "waiting")  # the index has its source
     index.write_text("question,verdict\nwhy,so\n")
     with self.assertRaisesRegex(ValueError, "index.csv is no sweep's"):
       sweep_jobs.recall(again, index)

@@ -52,10 +52,21 @@ class FacadeTest(parameterized.TestCase):
     self.assertEqual(main(observation)[0], 0)
     self.assertEqual(reach(observation)[0], 1)
     self.assertEqual(main.intentions, ("stack", "reach"))
-    self.assertEqual(main.control_hz, 5)
+    self.assertEqual(main.load_options, {"control_hz": 5})
     self.assertEqual(main(observation, "reach")[0], 1)
     main.intention = "reach"
     self.assertEqual(main(observation)[0], 1)
+
+  def test_a_policy_from_pixels_says_what_it_sees(self):
+    config = {"control_hz": 10, "camera_size": 48}
+    with (
+      mock.patch("lfgp_dmc.agents.policy.Policy", _Policy),
+      mock.patch.object(run_folder, "read_config", return_value=config),
+    ):
+      options = lfgp_dmc.load_policy("runs/a").load_options
+    self.assertEqual(
+      options, {"control_hz": 10, "observations": "vision", "camera_size": 48}
+    )
 
   def test_the_layout_covers_the_59_once(self):
     slices = [

@@ -11,6 +11,7 @@ import lfgp_dmc
 from lfgp_dmc.observations import OBSERVATION_SIZE
 from lfgp_dmc.task_names import ALL_TASKS
 from lfgp_dmc.tasks import workspace as ws
+from lfgp_dmc.tasks.goals import GOALS, starts
 from tests.tasks import fixtures
 from tests.tasks.fixtures import KEEP, pose
 
@@ -58,7 +59,7 @@ class AllTasksTest(parameterized.TestCase):
       np.testing.assert_allclose(observed["finger_positions"], 1.0, atol=0.01)
       self.assertLess(np.abs(observed["block_linear_velocities"]).max(), 0.01)
       stacked = abs(green[2] - ws.STACKED_Z) < 1e-3
-      self.assertEqual(stacked, task == "unstack_stack")
+      self.assertEqual(stacked, GOALS[task].start is starts.GREEN_ON_BLUE)
       if not stacked:
         self.assertGreater(np.linalg.norm(blue[:2] - green[:2]), 0.0399)
 
@@ -252,6 +253,18 @@ class StartTest(parameterized.TestCase):
     self.assertGreater(away.max(), 0.1)
     self.assertLess(away.max(), 0.131)
 
+  def test_a_buffer_that_comes_and_goes_is_in_the_specification(self):
+    env = lfgp_dmc.load("reach", 0)
+    with self.assertRaisesRegex(ValueError, "seed is None; valid: 0 to"):
+      env.reseed(None)
+    observable = env.task.observables["ee_position"]
+    for size, shape in ((3, (3, 3)), (None, (3,))):
+      observable.buffer_size = size
+      observed = env.reset().observation["ee_position"]
+      self.assertEqual(observed.shape, shape)
+      self.assertEqual(env.observation_spec()["ee_position"].shape, shape)
+    env.close()
+
   @parameterized.parameters(
     ("juggle", {}, "juggle.*stack, unstack_stack"),
     ("stack", {"reward": "shaped"}, "sparse, dense"),
@@ -261,6 +274,8 @@ class StartTest(parameterized.TestCase):
     ("stack", {"time_limit": 0.0}, "time_limit"),
     ("stack", {"time_limit": "18"}, "time_limit='18'; valid is 0.05 s"),
     ("stack", {"camera_size": 64.5}, "camera_size is 64.5; valid: 32 to 480"),
+    ("stack", {"seed": 1.5}, "seed is 1.5; valid: 0 to 4294967295"),
+    ("stack", {"seed": -1}, "seed is -1; valid: 0 to 4294967295"),
     ("stack", {"colour": 1}, "unknown option colour; valid: reward, obs"),
   )
   def test_unknown_names_list_the_valid_ones(self, task, options, message):

@@ -86,6 +86,16 @@ class AttemptsTest(FolderTest):
       "| BC | 10 | 40 % (40 to 40) | 10 % (10 to 10) | 25 % (25 to 25) |  |",
     ])  # fmt: skip
 
+  def test_where_no_method_has_all_tasks_each_is_compared(self):
+    results = self._read("lfgp,stack,10,0,,0.8,,", "bc,stack,10,0,,0.4,,",
+                         "lfgp,insert,10,0,,0.8,,", "bc,insert,10,0,,0.9,,",
+                         "bc,bring,10,0,,0.4,,")  # fmt: skip
+    table = attempt_figures.table(attempts.summary(results, "bc"), "bc")
+    better = "probability of improvement over BC"
+    header, _, lfgp, _ = table.splitlines()
+    self.assertEndsWith(header, f"| {better}, Stack | {better}, Insert |")
+    self.assertEndsWith(lfgp, "| 100 % | 0 % |")
+
   def test_draws_each_task_and_all(self):
     points, _ = self._points()
     with mock.patch.object(drawing, "save", wraps=drawing.save) as save:

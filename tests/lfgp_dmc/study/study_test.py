@@ -33,6 +33,12 @@ class StatisticsTest(absltest.TestCase):
     found = statistics.interquartile_mean(_scores([0, 1], [5, 5]))
     np.testing.assert_allclose(found, [[3.0], [2.5], [3.0]])
 
+  def test_equal_runs_have_an_interval_of_no_height(self):
+    for runs in range(2, 9):
+      for score in (0.66, 0.1, 1 / 3):
+        found = statistics.interquartile_mean(np.full((runs, 4, 1), score))
+        self.assertBetween(found.middle[0], found.low[0], found.high[0])
+
   def test_a_single_run_has_no_interval(self):
     found = statistics.interquartile_mean(np.full((1, 1, 3), 0.25))
     np.testing.assert_allclose(found, np.full((3, 3), 0.25))
@@ -78,7 +84,7 @@ class StudyTest(FolderTest):
     np.testing.assert_array_equal(curve.steps, [0, 100])
     np.testing.assert_allclose(curve.scores[:, 0], [[0, 0.5], [0.25, 1]])
     both = run_results.curve([(runs, "reach"), (runs[:1], "stack")])
-    self.assertIsNone(both)  # unlike numbers of seeds
+    self.assertLen(both.scores, 1)  # of the seed that both have
     (note,) = run_results.uneven(runs)
     self.assertIn("seed 0 to 200, seed 1 to 100", note)
     self.assertIsNone(run_results.curve([(runs, "insert")]))
@@ -164,6 +170,19 @@ class StudyTest(FolderTest):
       lacking = f"no runs of DAC on {', '.join(MAIN_TASKS)}"
       self.assertIn(lacking, notes)
       self.assertIn("no runs of Multitask BC on bring, insert", notes)
+
+  def test_all_four_are_of_the_seeds_that_each_has(self):
+    for main_task in MAIN_TASKS:
+      for seed in range(3 if main_task == "stack" else 2):
+        self._write("lfgp", main_task, seed, {100: seed})
+        self._write("dac", main_task, seed + 5 * len(main_task), {100: 1})
+    path = self.folder / "a.png"
+    notes = figures.draw("main", self._read(), path, kind="iqm")
+    self.assertIn("all four of LfGP: 2 of 3 seeds", notes)
+    self.assertIn("DAC has no seed and step in common of all tasks", notes)
+    rows = csv_files.read(f"{path}.csv")[1]
+    (row,) = (row for row in rows if row["main_task"] == "all")
+    self.assertEqual((row["method"], row["runs"]), ("lfgp", "2"))
 
   def test_only_cloning_becomes_bars(self):
     for seed in range(3):
