@@ -114,7 +114,8 @@ def _check_flags(config: configs.RunConfig) -> None:
     useless += config_flags.given()
   if useless:
     raise UserError(f"--{useless[0]} does nothing with --what={what}")
-  if config.environment or config.camera_size:
+  needs_floats = what in ("training", "acting", "memory")
+  if config.environment or (needs_floats and config.camera_size):
     raise UserError("benchmarks are of the block tasks and their 59 floats")
   is_cloning = configs.ALGORITHMS[config.algorithm].is_supervised
   if is_cloning and what != "environment":

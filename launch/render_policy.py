@@ -76,8 +76,8 @@ _UNTIL = flags.DEFINE_bool(
 
 _USELESS = {
   "episode": (_ATTEMPTS,),
-  "strips": (_COLLECTION, _GRID, _STEPS, _UNTIL),
-  "reset": (_ATTEMPTS, _EVERY, _STEPS, _STRIP, _UNTIL),
+  "strips": (_COLLECTION, _EVERY, _GRID, _OVERLAY, _STEPS, _UNTIL),
+  "reset": (_ATTEMPTS, _EVERY, _OVERLAY, _STEPS, _STRIP, _UNTIL),
 }
 
 _MOST_CELLS = 100

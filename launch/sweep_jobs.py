@@ -21,7 +21,6 @@ COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
            "wall_s", "env_step", "success", "folder", "message")  # fmt: skip
 
 _STEPS = "--config.env_steps="
-_OF_TASK = tuple(f"_{task}" for task in ALL_TASKS)
 _MAY_CHANGE = ("--config.demonstrations=", "--config.evaluation_workers=")
 _ENDLESS = 1 << 62
 
@@ -174,14 +173,19 @@ def chain(
   """
   known = {job.name for job in jobs}
   if index is not None:
-    known |= {r["name"] for r in _rows_of(index) if r["state"] == DONE}
-  tasks = {f"_{job.main_task}" for job in jobs}
+    known |= {
+      row["name"]
+      for row in _rows_of(index)
+      if row["state"] == DONE
+      and (index.parent / row["name"] / run_folder.CONFIG_NAME).is_file()
+    }
+  bare = {job.flagfile.stem for job in jobs}
   for start in starts:
     parts = start.split(":")
     if len(parts) != 3 or not all(parts):
       raise ValueError(f"{start!r}; valid: TARGET:SOURCE:config.FIELD")
     target, source, field = parts
-    if not target.endswith((*_OF_TASK, *tasks)):
+    if target in bare:
       raise ValueError(
         f"{start!r}; valid: a TARGET with its task, such as lfgp_stack"
       )

@@ -196,7 +196,9 @@ def _check_source(
     **stored.get(run_folder.POLICY_FIELD, {}),
   }
   for name, value in own.items():
-    if theirs.get(name, value) != value:
+    # Standardisation comes along with the networks, if they have it.
+    is_brought = name == "standardise" and not value
+    if theirs.get(name, value) != value and not is_brought:
       raise ValueError(
         f"config.agent.inputs.{name} is {value}; {field} {path} has "
         f"{theirs[name]}"

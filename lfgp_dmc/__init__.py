@@ -138,6 +138,7 @@ def load_policy(
   policy.begin(task, seed)
   config = read_config(run_folder)
   options = {"control_hz": config.get("control_hz", 20)}
-  if size := config.get("camera_size", 0):
+  if policy.frame_shape and not config.get("environment"):
+    size = config["camera_size"]
     options |= {"observations": "vision", "camera_size": size}
   return StoredPolicy(policy, task, options)

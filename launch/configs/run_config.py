@@ -47,7 +47,8 @@ class RunConfig:
   # Where the agent acts: ours, or `package.module:factory` of any dm_env.
   environment: Text = ""
   control_hz: PositiveInt = 20  # of the block tasks: 20, 10 or 5 steps a second
-  # From pixels: the side of the block tasks' frames; 0: from the 59 floats.
+  # From pixels: the side of the block tasks' frames; 0: from the 59 floats. Of
+  # another environment it means nothing.
   camera_size: Count = 0
   # Of another environment, which decides them; the block tasks': 18 s.
   episode_steps: Count = 0
@@ -112,11 +113,6 @@ class RunConfig:
       )
     if not self.environment and self.main_task not in ALL_TASKS:
       yield f"main_task is {self.main_task!r}; valid: {', '.join(ALL_TASKS)}"
-    if self.environment and self.camera_size:
-      yield (
-        f"camera_size is {self.camera_size}; valid: 0 with environment (which "
-        "has its own cameras)"
-      )
     if self.control_hz not in CONTROL_RATES:
       rates = ", ".join(map(str, CONTROL_RATES))
       yield f"control_hz is {self.control_hz!r}; valid: {rates}"
@@ -132,7 +128,7 @@ class RunConfig:
         yield (
           f"{valid} environment (only the block tasks' symmetries are known)"
         )
-      if self.camera_size and value:
+      if self._seen_size and value:
         yield f"{valid} camera_size ({why})"
     if self.attempts_per_task and self.pairs_per_task:
       yield (
@@ -152,7 +148,7 @@ class RunConfig:
         f"warm_up is {self.warm_up}; valid: at most replay_capacity, "
         f"{self.replay_capacity}"
       )
-    if self.camera_size and self.transfer_from:
+    if self._seen_size and self.transfer_from:
       yield (
         f"transfer_from is {self.transfer_from!r}; valid: nothing with "
         "camera_size (its features would be another encoder's)"
@@ -165,15 +161,13 @@ class RunConfig:
       and agent.prior.weight
       and not agent.pretraining.updates
       and not (self.init_from or self.transfer_from)
-      and not self.camera_size  # which needs init_from anyway
+      and not self._seen_size  # which needs init_from anyway
     ):
       yield (
         f"agent.prior.weight is {agent.prior.weight}; valid: 0 without "
         "agent.pretraining.updates, init_from or transfer_from (the intentions "
         "would be held at random ones)"
       )
-    if self.transfer_main_head and not self.transfer_from:
-      yield "transfer_main_head is True; valid: False without transfer_from"
     if not self.init_from:
       return
     valid = f"init_from is {self.init_from!r}; valid: nothing"
@@ -193,8 +187,13 @@ class RunConfig:
   def environment_spec(self) -> EnvironmentSpec:
     """Where the agent acts."""
     return EnvironmentSpec(
-      self.main_task, self.environment, self.control_hz, self.camera_size
+      self.main_task, self.environment, self.control_hz, self._seen_size
     )
+
+  @property
+  def _seen_size(self) -> int:
+    """Of the block tasks' frames; another environment has its own."""
+    return 0 if self.environment else self.camera_size
 
   @property
   def most_episode_steps(self) -> int:

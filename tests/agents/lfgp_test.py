@@ -175,6 +175,11 @@ class BatchTest(absltest.TestCase):
       found = fixtures.among(batch.inputs, *shown)
       self.assertEqual(sum(found), expected)
 
+  def test_a_discriminator_that_would_see_nothing_is_refused(self):
+    blind = {"reward.input": "state", "reward.masked": f"0:{OBS}"}
+    with self.assertRaisesRegex(ValueError, "hide all that it sees"):
+      make_agent(**blind)
+
   def test_masked_floats_earn_nothing_at_either_scale(self):
     fields = {"reward.input": "state", "inputs.tanh_feature_scale": 0.1}
     agent = make_agent(**fields, **{"reward.masked": "1:3"})

@@ -61,7 +61,7 @@ _BAD = (
   ("sweep.py --seeds=a", "--seeds: invalid literal"),
   ("sweep.py --algorithms=sorcery", "none of these runs has a flagfile"),
   ("sweep.py --start_from=a", "valid: TARGET:SOURCE"),
-  ("sweep.py --start_from=lfgp_new:a:config.b", "valid: a TARGET with its tas"),
+  ("sweep.py --start_from=lfgp:a:config.init_from", "valid: a TARGET with its"),
   ("plot.py --runs=a --estimate=iqm", "--estimate goes with --figure=main|mul"),
   (
     "benchmark.py --what=bars --preset=few",

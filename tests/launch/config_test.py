@@ -147,11 +147,6 @@ class ConfigTest(parameterized.TestCase):
     ),
     ("--config.environment=toy", "config.environment is 'toy'; valid"),
     (
-      "--config.environment=a:b --config.camera_size=64",
-      "config.camera_size is 64; valid: 0 with environment",
-    ),
-    ("--config.transfer_main_head", "valid: False without transfer_from"),
-    (
       "--config.init_from=a --config.transfer_from=b",
       "config.init_from is 'a'; valid: nothing with transfer_from",
     ),
@@ -179,6 +174,12 @@ class ConfigTest(parameterized.TestCase):
     with self.assertRaises(ValueError) as caught:
       config_of(*arguments.split())
     self.assertIn(message, str(caught.exception))
+
+  def test_frames_of_another_environment_are_its_own(self):
+    config = config_of("--preset=pixels", "--config.environment=a:b",
+                       "--config.agent.prior.weight=0",
+                       "--config.transfer_from=a")  # fmt: skip
+    self.assertEqual(config.environment_spec.camera_size, 0)
 
   def test_only_the_block_tasks_have_symmetries(self):
     images = "--config.mirror_demonstrations"

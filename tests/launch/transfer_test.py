@@ -250,6 +250,19 @@ class InitFromTest(_RunTest):
       with self.assertRaisesRegex(UserError, message):
         self.train(config)
 
+  def test_standardisation_comes_along(self):
+    own = {"agent.networks.actor_trunk": "own"}
+    whole = {**own, "agent.inputs.standardise": True}
+    source, _ = self.train(self.config(env_steps=20, **whole), "source")
+    config = self.config(init_from=str(source), env_steps=20, **own)
+    run, _ = self.train(config, "a")
+    before, after = (
+      Policy.load(folder).arrays()["standardiser.deviation"]
+      for folder in (source, run)
+    )
+    self.assertFalse((before == 1).all())
+    np.testing.assert_array_equal(before, after)
+
 
 class ExamplesTest(_RunTest):
   def test_resumes_to_the_numbers_of_a_run_never_stopped(self):

@@ -14,6 +14,7 @@ class _Policy:
   """Stands in for `agents.policy.Policy`."""
 
   tasks = ("stack", "reach")
+  frame_shape = ()
 
   @classmethod
   def load(cls, folder):
@@ -61,6 +62,7 @@ class FacadeTest(parameterized.TestCase):
     config = {"control_hz": 10, "camera_size": 48}
     with (
       mock.patch("lfgp_dmc.agents.policy.Policy", _Policy),
+      mock.patch.object(_Policy, "frame_shape", (2, 48, 48, 3)),
       mock.patch.object(run_folder, "read_config", return_value=config),
     ):
       options = lfgp_dmc.load_policy("runs/a").load_options
