@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from absl import logging
 
-from lfgp_dmc import progress_bars, seeding, task_names
+from lfgp_dmc import progress_bars, seeding
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
@@ -23,7 +23,7 @@ from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import command, datasets, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
-from lfgp_dmc.observations import REWARD_PREFIX, SUCCESS_PREFIX
+from lfgp_dmc.observations import REWARD_PREFIX
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
@@ -129,12 +129,9 @@ def tasks_of(
   config: RunConfig, environment: dm_env.Environment
 ) -> tuple[str, ...]:
   """The tasks that are learned, the main task first."""
-  alone = (config.main_task,)
   if not ALGORITHMS[config.algorithm].is_multitask:
-    return alone
-  if config.environment:
-    return environments.with_observed_tasks(environment, alone, SUCCESS_PREFIX)
-  return task_names.task_set(config.main_task)
+    return (config.main_task,)
+  return config.environment_spec.tasks(environment)
 
 
 def make_replay(

@@ -23,7 +23,6 @@ from lfgp_dmc.data import demonstration_summary, demonstrations, files
 from lfgp_dmc.launch import command
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
-from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.pictures import film_strips, recorder, video
 
 _DATASET = flags.DEFINE_string("dataset", "", "The dataset's folder.")
@@ -57,22 +56,21 @@ def main() -> None:
       camera_size=_CAMERA.value,
     )
     with contextlib.closing(spec.build()) as environment:
-      found = _read(environment)
+      asked = spec.tasks(environment) if _TASK.value else ()
+      found = _read(environment, asked)
       if _STRIP.value:
         _draw(environment, found)
 
 
 def _read(
-  environment: dm_env.Environment,
+  environment: dm_env.Environment, asked: Sequence[str]
 ) -> dict[str, demonstrations.Demonstrations]:
   """Reads and describes; raises ValueError with every fault."""
   widths = environments.widths(environment)
   shape = environments.frame_shape(environment)
   folder = pathlib.Path(_DATASET.value)
   paths = files.own(folder, demonstrations.SUFFIX)
-  tasks = [path.stem for path in paths] or ["TASK"]
-  if _TASK.value:
-    tasks = list(_tasks_of(_TASK.value, environment))
+  tasks = asked or [path.stem for path in paths] or ["TASK"]
   found = demonstrations.read_folder(folder, tasks, *widths, shape)
   print(demonstration_summary.table(found))
   rates = sorted({data.attributes["control_hz"] for data in found.values()})
@@ -86,15 +84,6 @@ def _read(
   if len(rates) > 1:
     raise ValueError(f"{folder} has several control rates")
   return found
-
-
-def _tasks_of(main: str, environment: dm_env.Environment) -> Sequence[str]:
-  """What LfGP learns of it."""
-  if _ENVIRONMENT.value:
-    return environments.with_observed_tasks(
-      environment, (main,), SUCCESS_PREFIX
-    )
-  return lfgp_dmc.task_set(main)
 
 
 def _check_strip(strip: pathlib.Path) -> None:

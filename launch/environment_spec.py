@@ -13,7 +13,8 @@ import dm_env
 import lfgp_dmc
 from lfgp_dmc import graphics
 from lfgp_dmc.acting import environments
-from lfgp_dmc.task_names import CONTROL_RATES, check_task
+from lfgp_dmc.observations import SUCCESS_PREFIX
+from lfgp_dmc.task_names import CONTROL_RATES, check_task, task_set
 
 _FIELD = "config.environment"
 
@@ -52,6 +53,14 @@ class EnvironmentSpec:
       show_rewards=show_rewards,
       **seen,
     )
+
+  def tasks(self, environment: dm_env.Environment) -> tuple[str, ...]:
+    """What LfGP learns in what was built, the main task first."""
+    if self.environment:
+      return environments.with_observed_tasks(
+        environment, (self.main_task,), SUCCESS_PREFIX
+      )
+    return task_set(self.main_task)
 
   @property
   def may_draw(self) -> bool:
