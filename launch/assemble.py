@@ -1,37 +1,27 @@
 """The parts of a run, made once from its config."""
 
-import dataclasses
 import functools
 import os
 import pathlib
 from typing import NamedTuple
 
 import dm_env
-import numpy as np
 import torch
-from absl import logging
 
-from lfgp_dmc import progress_bars, seeding
+from lfgp_dmc import seeding
 from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
-from lfgp_dmc.agents.networks.linear import has_bfloat16
-from lfgp_dmc.agents.policy import Policy
-from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import command, datasets, policies
-from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch import command, datasets, encoding, policies, torch_setup
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc.observations import REWARD_PREFIX
-from lfgp_dmc.runs import checkpoints, run_folder
+from lfgp_dmc.runs import checkpoints
 from lfgp_dmc.runs.run import Run
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import TrainSchedule
 from lfgp_dmc.types import ActingAgent, SupervisedAgent
-
-_DETERMINISTIC_CUBLAS = ":4096:8"
-_FRAMES = 256  # that are encoded at a time
 
 
 class Parts(NamedTuple):
@@ -55,7 +45,7 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   Raises:
     UserError: there is no such device, environment, dataset or encoder.
   """
-  device = _set_up_torch(config)
+  device = torch_setup.apply(config)
   with command.checked_input():
     # Without `reseed`, each continuation has starts of its own.
     count = (
@@ -71,58 +61,14 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   found = datasets.load(config, tasks, widths, shape)
   if not shape or ALGORITHMS[config.algorithm].is_supervised:
     return Parts(environment, tasks, widths, found, device, shape)
-  clone = _clone_of(config, folder, shape)
+  clone = encoding.clone_of(config, folder, shape)
   environment = environments.with_features(environment, clone.encode)
-  found = {k: _with_features(k, data, clone) for k, data in found.items()}
+  found = {
+    k: encoding.with_features(k, data, clone) for k, data in found.items()
+  }
   widths = environments.widths(environment)
   encoder = encoders.frozen(clone)
   return Parts(environment, tasks, widths, found, device, shape, encoder)
-
-
-def _clone_of(
-  config: RunConfig, folder: pathlib.Path | None, shape: tuple[int, ...]
-) -> Policy:
-  """Whose encoder is used: the run's own policy, or what it starts from."""
-  if not config.init_from:
-    raise UserError(
-      "config.init_from is not set: from pixels, give the folder of a clone, "
-      "whose encoder is used: train one by --preset=pixels "
-      "--config.algorithm=multitask_bc (or bc, for dac)"
-    )
-  source: files.Path = config.init_from
-  if folder is not None and (folder / run_folder.ARRAYS_NAME).exists():
-    source = folder
-  with command.checked_input():
-    policy = Policy.load(source)
-  if not policy.frame_shape:
-    raise UserError(f"config.init_from: {config.init_from} sees no pixels")
-  if policy.frame_shape != shape:
-    raise UserError(
-      f"config.init_from: {config.init_from} sees frames "
-      f"{list(policy.frame_shape)}; the environment has {list(shape)}"
-    )
-  return policy
-
-
-def _with_features(
-  task: str, data: Demonstrations, clone: Policy
-) -> Demonstrations:
-  """Demonstrations with features in the place of frames."""
-  frames = data.frames
-  assert frames is not None, "they were checked"
-  parts = []
-  with progress_bars.bar(
-    total=len(frames), desc=f"encoding {task}", unit="frame"
-  ) as bar:
-    for start in range(0, len(frames), _FRAMES):
-      parts.append(clone.encode(frames[start : start + _FRAMES]))
-      bar.update(len(parts[-1]))
-  features, rows = np.concatenate(parts), data.frame_rows()
-  return dataclasses.replace(
-    data,
-    observation=np.hstack([data.observation, features[rows]]),
-    next_observation=np.hstack([data.next_observation, features[rows + 1]]),
-  )
 
 
 def tasks_of(
@@ -166,7 +112,7 @@ def make_agent(
     seeding.derive(config.seed, "agent"),
     parts.device,
     *parts.widths,
-    bfloat16=_uses_bfloat16(config, parts.device),
+    bfloat16=torch_setup.uses_bfloat16(config, parts.device),
     threads=config.threads or command.cores(),
     cuda_graphs=config.cuda_graphs,
     frame_shape=parts.frame_shape,
@@ -218,34 +164,3 @@ def _schedule(config: RunConfig, progress_bar: bool) -> TrainSchedule:
     evaluate_first=config.evaluate_first,
     progress_bar=progress_bar,
   )
-
-
-def _set_up_torch(config: RunConfig) -> torch.device:
-  """Sets threads and determinism; returns the device."""
-  torch.set_num_threads(config.threads or command.cores())
-  if config.deterministic:
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", _DETERMINISTIC_CUBLAS)
-    torch.use_deterministic_algorithms(True)
-  name = config.device
-  if name == "auto":
-    name = "cuda" if torch.cuda.is_available() else "cpu"
-  try:
-    device = torch.device(name)
-    torch.zeros(1, device=device)
-  except (RuntimeError, AssertionError, NotImplementedError) as error:
-    reason = str(error).partition("\n")[0]
-    raise UserError(
-      f"config.device is {config.device!r}: {reason}; valid: auto, cpu, or "
-      "cuda where this build of torch finds one"
-    ) from None
-  if config.bfloat16 and not _uses_bfloat16(config, device):
-    logging.warning(
-      "config.bfloat16: this CPU would emulate products in bfloat16, many "
-      "times slower; they are made in float32"
-    )
-  return device
-
-
-def _uses_bfloat16(config: RunConfig, device: torch.device) -> bool:
-  """Whether products are asked for in bfloat16 and the processor has them."""
-  return config.bfloat16 and (device.type != "cpu" or has_bfloat16())

@@ -5,7 +5,10 @@ import time
 from unittest import mock
 
 from lfgp_dmc.data import csv_files
-from lfgp_dmc.launch import sweep, sweep_jobs
+from lfgp_dmc.launch.sweeps import jobs as jobs_lib
+from lfgp_dmc.launch.sweeps import loop
+from lfgp_dmc.launch.sweeps import starts as starts_lib
+from lfgp_dmc.launch.sweeps.index import Index
 from tests.fixtures import FolderTest
 
 
@@ -40,14 +43,14 @@ class SweepTest(FolderTest):
       (self.flags / f"{stem}.flags").touch()
 
   def _jobs(self, algorithms, seeds=(0,), starts=(), arguments=()):
-    jobs = sweep_jobs.make_jobs(
+    jobs = jobs_lib.make_jobs(
       algorithms, ("stack", "bring"), seeds, self.folder, arguments, self.flags
     )
-    sweep_jobs.chain(jobs, starts)
+    starts_lib.chain(jobs, starts)
     return jobs
 
   def _run(self, jobs, engine, restarts=1):
-    sweep.Sweep(jobs, self.folder / "index.csv", restarts).run(engine)
+    loop.Sweep(jobs, Index(self.folder), restarts).run(engine)
     return {job.name: job.state for job in jobs}
 
   def test_names_runs_after_flagfiles_and_seeds(self):
@@ -112,7 +115,7 @@ class SweepTest(FolderTest):
     jobs = self._jobs(("lfgp_move_object",))
     engine = FakeEngine({"lfgp_move_object_0": [-9, 1, 0]})
     start = time.monotonic()
-    with mock.patch.object(sweep, "_REST", 0.5):
+    with mock.patch.object(loop, "_REST", 0.5):
       states = self._run(jobs, engine, restarts=2)
     self.assertEqual(states, {"lfgp_move_object_0": "done"})
     self.assertLen(engine.started, 3)
@@ -149,10 +152,10 @@ class SweepTest(FolderTest):
         f"{step},{job.main_task},0,0,1,9,1.0\n"
       )
     jobs[2].state, jobs[2].wall_s = "done", 60
-    index = self.folder / "index.csv"
-    sweep_jobs.write_index(jobs, index)
+    index = Index(self.folder)
+    index.write(jobs)
     again = self._jobs(("lfgp",), (0, 1))
-    sweep_jobs.recall(again, index)
+    index.recall(again)
     self.assertEqual(
       [job.state for job in again], ["waiting", "done", "done", "waiting"]
     )
@@ -162,24 +165,24 @@ class SweepTest(FolderTest):
     same = self._jobs(
       ("lfgp",), (0, 1), arguments=[*given[:2], given[2] + "99"]
     )
-    sweep_jobs.recall(same, index)
+    index.recall(same)
     self.assertEqual([j.state for j in same], [j.state for j in again])
     self.assertEqual(same[0].train_arguments()[2:], given[1:2])
     longer = self._jobs(("lfgp",), (0, 1), arguments=["--config.env_steps=101"])
-    sweep_jobs.recall(longer, index)
+    index.recall(longer)
     self.assertEqual({job.state for job in longer}, {"waiting"})
     self.assertEqual(
       longer[1].train_arguments(),
       [f"--run={longer[1].folder}", "--resume", "--config.env_steps=101"],
     )
-    row = csv_files.read(index)[1][0]
+    row = csv_files.read(index.path)[1][0]
     self.assertEqual((row["env_step"], row["success"]), ("50", "1.000"))
-    sweep_jobs.write_index(self._jobs(("lfgp_new",)), index)
-    self.assertLen(csv_files.read(index)[1], 6)  # theirs stay
+    index.write(self._jobs(("lfgp_new",)))
+    self.assertLen(csv_files.read(index.path)[1], 6)  # theirs stay
     later = self._jobs(("lfgp",), (1,))
     start = "lfgp_bring:lfgp_stack:config.init_from"
-    sweep_jobs.chain(later[1:], [start], index)
+    starts_lib.chain(later[1:], [start], index.done())
     self.assertEqual(later[1].state, "waiting")  # the index has its source
-    index.write_text("question,verdict\nwhy,so\n")
+    index.path.write_text("question,verdict\nwhy,so\n")
     with self.assertRaisesRegex(ValueError, "index.csv is no sweep's"):
-      sweep_jobs.recall(again, index)
+      index.recall(again)

@@ -12,7 +12,7 @@ import lfgp_dmc
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents import cloning
 from lfgp_dmc.data import demonstrations, evaluation_csv
-from lfgp_dmc.launch import assemble
+from lfgp_dmc.launch import torch_setup
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run, run_folder
 from lfgp_dmc.runs.schedule import Progress
@@ -48,7 +48,9 @@ class TrainingTest(fixtures.RunTest):
       (True, True),
     ):
       with (
-        mock.patch.object(assemble, "has_bfloat16", return_value=has_products),
+        mock.patch.object(
+          torch_setup, "has_bfloat16", return_value=has_products
+        ),
         self.assertLogs() as found,
       ):
         logging.info("so that there is a line")

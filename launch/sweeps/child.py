@@ -1,6 +1,6 @@
 """Becomes another program, which the kernel kills when its parent dies.
 
-  python sweep_child.py PARENT_PID PROGRAM ARGUMENT...
+  python child.py PARENT_PID PROGRAM ARGUMENT...
 
 Without it, a run of a lost sweep or Ray worker would go on writing to its
 folder, and would hold the folder's lock against the resumed run. Linux only;

@@ -20,8 +20,8 @@ from absl import logging
 from lfgp_dmc import threads
 from lfgp_dmc.launch.command import UserError
 
-_TRAIN = pathlib.Path(__file__).with_name("train.py")
-_CHILD = pathlib.Path(__file__).with_name("sweep_child.py")
+_TRAIN = pathlib.Path(__file__).parents[1] / "train.py"
+_CHILD = pathlib.Path(__file__).with_name("child.py")
 
 
 class LocalEngine:

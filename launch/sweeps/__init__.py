@@ -1,0 +1,1 @@
+"""What `launch/sweep.py` runs: which runs, where, until all are done."""
