@@ -25,9 +25,9 @@ class PolicyOptions(NetworksConfig):
   tanh_feature_scale: fields.NonNegative = 0.0
   # Of an encoder: [C, H, W, 3] of frames, of which it makes the last features
   # of an observation, and its channels.
-  frame_shape: list[fields.PositiveInt] = dataclasses.field(
-    default_factory=list
-  )
+  frame_shape: Annotated[
+    list[fields.PositiveInt], Field(min_length=4, max_length=4)
+  ] = dataclasses.field(default_factory=list)  # empty: there is none
   features: fields.Count = 0
   channels: fields.Count = 0
   env_step: fields.Count = 0  # how long it was trained

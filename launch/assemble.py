@@ -48,12 +48,11 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   device = torch_setup.apply(config)
   with command.checked_input():
     # Without `reseed`, each continuation has starts of its own.
-    count = (
-      len(checkpoints.every(RunFolder(folder).checkpoints)) if folder else 0
-    )
+    stored = checkpoints.every(RunFolder(folder).checkpoints) if folder else []
+    step = int(stored[-1].name) if stored else 0
     environment = config.environment_spec.build(
       config.agent.keeps_rewards,
-      seeding.derive(config.seed, "environment", count),
+      seeding.derive(config.seed, "environment", step),
     )
     tasks = tasks_of(config, environment)
     shape = environments.frame_shape(environment)
@@ -95,7 +94,7 @@ def make_replay(
     config.replay_capacity if folder else 1,
     *parts.widths,
     folder,
-    slack=min(slack, config.env_steps) if folder else 0,
+    slack=slack if folder else 0,
     reward_tasks=reward_tasks,
   )
 

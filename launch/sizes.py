@@ -1,6 +1,7 @@
 """Sizes that no machine has room for, refused before anything is made."""
 
 import contextlib
+import errno
 import os
 import shutil
 from collections.abc import Iterator
@@ -47,7 +48,10 @@ def refuse(name: str, value: int, floats: int, room: int | None = None) -> None:
 
 def is_memory_fault(error: BaseException) -> bool:
   """Whether NumPy, torch (on any device) or the system had no memory."""
-  return isinstance(error, MemoryError) or "allocate" in str(error)
+  if isinstance(error, RuntimeError):  # torch's
+    return "allocate" in str(error)
+  is_systems = isinstance(error, OSError) and error.errno == errno.ENOMEM
+  return isinstance(error, MemoryError) or is_systems
 
 
 @contextlib.contextmanager

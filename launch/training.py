@@ -162,11 +162,7 @@ def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
   """Takes over what `transfer_from` and `init_from` name."""
   if not (config.transfer_from or config.init_from):
     return
-  if not isinstance(agent, LfgpAgent) or replay is None:
-    raise ValueError(
-      f"config.transfer_from is {config.transfer_from!r}; valid: nothing, "
-      f"since {config.algorithm} keeps no replay"
-    )
+  assert isinstance(agent, LfgpAgent) and replay is not None, "was checked"
   if config.transfer_from:
     _transfer(config, agent, replay)
   if config.init_from:

@@ -168,6 +168,11 @@ class RunConfig:
         "agent.pretraining.updates, init_from or transfer_from (the intentions "
         "would be held at random ones)"
       )
+    if self.transfer_from and not isinstance(agent, LfgpConfig):
+      yield (
+        f"transfer_from is {self.transfer_from!r}; valid: nothing with "
+        f"{self.algorithm}, which keeps no replay"
+      )
     if not self.init_from:
       return
     valid = f"init_from is {self.init_from!r}; valid: nothing"

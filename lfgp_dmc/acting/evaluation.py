@@ -94,7 +94,7 @@ class _Player:
     success: int | None = int(first is not None)
     if environments.has_succeeded(timestep, task) is None:
       success = None
-    if environments.is_physics_failure(timestep):
+    if environments.is_physics_failure(timestep) and success is not None:
       logging.warning(
         "physics failed in episode %d of %s at step %d: counted as a failure",
         episode,

@@ -37,8 +37,9 @@ class Replay(Ring):
       folder: where the arrays are mapped; None keeps them in memory.
       reward_tasks: whose dense rewards are kept beside each row.
       slack: rows kept intact beyond the capacity; at least the rows added
-        between two checkpoints where a full ring must resume exactly. An
-        existing folder keeps its own.
+        between two checkpoints where a full ring must resume exactly: with
+        less, it resumes without those that were overwritten. An existing folder
+        keeps its own.
       read_only: whether the folder's files are never written to.
 
     Raises:
@@ -52,6 +53,8 @@ class Replay(Ring):
     self._folder = None if folder is None else pathlib.Path(folder)
     self._read_only = read_only
     self._reserved = 0  # rows known to have disk under them
+    self._flushed = 0  # the total at the last flush
+    self._promised = self._size  # rows ever added that the sidecar allows for
     self._mapped: list[np.memmap] = []
     self._observation = self._column("observation", observation_size)
     self._action = self._column("action", action_size)
@@ -171,9 +174,17 @@ class Replay(Ring):
       return
     for mapped in self._mapped:
       mapped.flush()
+    self._flushed = self.total
+    slack = self._size - self.capacity
+    self._promised = max(self._promised, self._written, self.total + slack)
+    self._describe(self._written)
+
+  def _describe(self, written: int) -> None:
+    """Writes the sidecar."""
+    assert self._folder is not None
     description = {
-      "total": self.total,
-      "written": self._written,
+      "total": self._flushed,
+      "written": written,
       "capacity": self.capacity,
       "size": self._size,
       "reward_tasks": list(self.reward_tasks),
@@ -182,6 +193,10 @@ class Replay(Ring):
 
   def _put(self, rows, transition: Transition, rewards, count: int) -> None:
     """Writes to `rows` of the arrays; counts `count` new ones."""
+    if self._folder is not None and self.total + count > self._promised:
+      # Rows of the last flush go: a kill must not leave them in the count.
+      self._promised = self.total + count + self.capacity // 10
+      self._describe(self._promised)
     while self._mapped and self._reserved <= np.max(rows, initial=-1):
       stops = [mapped_rows.reserve(m, self._reserved) for m in self._mapped]
       self._reserved = stops[0]
@@ -226,6 +241,9 @@ class Replay(Ring):
         f"expected {self.capacity} ({self._size})"
       )
     self.total, self._written = found["total"], found["written"]
+    self._flushed = self.total
+    slack = self._size - self.capacity
+    self._promised = max(self._size, self._written, self.total + slack)
 
 
 def _read_sidecar(folder: pathlib.Path) -> dict[str, Any]:

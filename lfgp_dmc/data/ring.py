@@ -25,7 +25,7 @@ class Ring:
 
   def __len__(self) -> int:
     """Rows that can be sampled."""
-    return self.total - self._start
+    return max(0, self.total - self._start)
 
   @property
   def _start(self) -> int:

@@ -57,9 +57,7 @@ def save(
   try:
     aside.mkdir()
     _write(aside, state)
-    if final.exists():  # of before a fall-back to an older checkpoint
-      shutil.rmtree(final)
-    aside.rename(final)
+    _replace(aside, final)
     files.flush_to_disk(folder)
   finally:
     shutil.rmtree(aside, ignore_errors=True)
@@ -110,6 +108,25 @@ def _write(aside: pathlib.Path, state: Mapping[str, Any]) -> None:
   files.write_json(aside / _STATE, tree)
   manifest = {name: _fingerprint(aside / name) for name in (_ARRAYS, _STATE)}
   files.write_json(aside / _MANIFEST, manifest)
+
+
+def _replace(aside: pathlib.Path, final: pathlib.Path) -> None:
+  """Renames `aside`; what was there goes, but only once it is done.
+
+  There is something after a fall-back to an older checkpoint, and where a run's
+  last evaluation was stopped and made up for.
+  """
+  if not final.exists():
+    aside.rename(final)
+    return
+  old = final.with_name(f"{_PARTIAL}old-{final.name}")
+  final.rename(old)
+  try:
+    aside.rename(final)
+  except OSError:
+    old.rename(final)
+    raise
+  shutil.rmtree(old)
 
 
 def _fingerprint(path: pathlib.Path) -> dict[str, Any]:

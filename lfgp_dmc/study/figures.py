@@ -136,7 +136,7 @@ def learning_curve(
 def _numbers(lines: Lines, kind: str) -> list[dict[str, Any]]:
   """The rows of the CSV."""
   rows = [
-    (*cell, method, "" if method in run_results.WITHOUT_STEPS else step,
+    (*cell, method, "" if run_results.is_cloning(method) else step,
      len(curve.scores), kind, *(f"{value:.6g}" for value in values))
     for (cell, method), (curve, estimate) in lines.items()
     for step, *values in zip(curve.steps, *estimate, strict=True)

@@ -67,7 +67,7 @@ def draw(path: files.Path, output: files.Path) -> None:
   end = max(line[-1][0] for curves in shown for line in curves.values())
   styles = drawing.styles_of(dict.fromkeys(itertools.chain(*shown)))
   algorithm, main_task = config["algorithm"], config["main_task"]
-  is_cloning = algorithm in run_results.WITHOUT_STEPS
+  is_cloning = run_results.is_cloning(algorithm)
   unit = "updates" if is_cloning else drawing.STEPS
   rows = 1 if len(panels) < 4 else 2
   columns = max(2, -(-len(panels) // rows))  # room for the title

@@ -13,8 +13,7 @@ from lfgp_dmc.runs import run_folder
 
 SUCCESS, RETURN = "success", "return"
 QUANTITIES = (SUCCESS, RETURN)
-# Cloning takes no environment steps: its last evaluation is its result.
-WITHOUT_STEPS = ("bc", "bc_less", "multitask_bc")
+_CLONING = ("bc", "bc_less", "multitask_bc")
 
 
 class Run(NamedTuple):
@@ -89,6 +88,11 @@ def method_of(config: Mapping[str, Any]) -> str:
   return f"{algorithm}_play" if "play" in folder.name.split("_") else algorithm
 
 
+def is_cloning(method: str) -> bool:
+  """Whether it takes no steps: its last evaluation is its result."""
+  return method.removesuffix("_play") in _CLONING
+
+
 def curve(
   strata: Sequence[tuple[Sequence[Run], str]], quantity: str = SUCCESS
 ) -> Curve | None:
@@ -119,7 +123,7 @@ def curve(
 def uneven(runs: Sequence[Run]) -> list[str]:
   """A note, if some seeds were evaluated for longer than others."""
   ends = {run.seed: max(row.env_step for row in run.rows) for run in runs}
-  if len(set(ends.values())) < 2 or runs[0].method in WITHOUT_STEPS:
+  if len(set(ends.values())) < 2 or is_cloning(runs[0].method):
     return []
   listed = ", ".join(f"seed {seed} to {end}" for seed, end in ends.items())
   method, main_task, *_ = runs[0]
@@ -133,7 +137,7 @@ def _points(run: Run, task: str, quantity: str) -> dict[int, float]:
     value = row.success if quantity == SUCCESS else row.episode_return
     if row.task == task and value is not None:
       values[row.env_step].append(value)
-  if run.method in WITHOUT_STEPS and values:
+  if is_cloning(run.method) and values:
     values = {0: values[max(values)]}
   return {step: float(np.mean(episodes)) for step, episodes in values.items()}
 

@@ -161,6 +161,10 @@ class ConfigTest(parameterized.TestCase):
       "config.agent.prior.weight is 5.0; valid: 0 without",
     ),
     (
+      "--config.algorithm=bc --config.transfer_from=runs/x",
+      "config.transfer_from is 'runs/x'; valid: nothing with bc, which keeps",
+    ),
+    (
       "--config.transfer_from={source_task} --config.main_task=lift",
       "config.main_task is 'lift'; valid, with {source_task}: stack",
     ),

@@ -9,11 +9,13 @@ from absl import logging
 from absl.testing import parameterized
 
 import lfgp_dmc
+from lfgp_dmc import toy
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents import cloning
 from lfgp_dmc.data import demonstrations, evaluation_csv
-from lfgp_dmc.launch import torch_setup
+from lfgp_dmc.launch import assemble, torch_setup
 from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.runs import run, run_folder
 from lfgp_dmc.runs.schedule import Progress
 from tests import fixtures as shared
@@ -212,6 +214,28 @@ class TrainingTest(fixtures.RunTest):
     ):
       self.train(self.config())
     self.assertFalse((self.folder / "runs" / "a").exists())
+
+  def test_other_faults_are_not_taken_for_want_of_memory(self):
+    fault = OSError(28, "No space left on device", "runs/allocated/a")
+    with (
+      mock.patch.object(run.Run, "_checkpoint", side_effect=fault),
+      self.assertRaisesRegex(OSError, "No space left"),
+    ):
+      self.train(self.config())
+    self.assertTrue((self.folder / "runs" / "a").exists())
+
+  def test_each_continuation_has_starts_of_its_own(self):
+    seeds = []
+    with mock.patch.object(EnvironmentSpec, "build", autospec=True) as build:
+      build.side_effect = lambda spec, _, seed: (
+        seeds.append(seed) or toy.PointEnvironment()
+      )
+      for kept in ("", "20 40 60", "40 60 80"):  # of older ones, few stay
+        for step in kept.split():
+          path = self.folder / kept / "checkpoints" / f"{step:0>9}"
+          path.mkdir(parents=True)
+        assemble.make_parts(self.config(), self.folder / kept)
+    self.assertLen(set(seeds), 3)
 
   def test_little_memory_later_loses_nothing(self):
     config = self.config(env_steps=120, checkpoint_every=60)

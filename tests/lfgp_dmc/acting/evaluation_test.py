@@ -84,6 +84,9 @@ class EvaluateTest(absltest.TestCase):
       rows = _evaluate(make, tasks=("right",))
     self.assertEqual([row.success for row in rows], [1, 0, 1])
     self.assertIsNone(rows[1].steps_to_success)
+    with self.assertNoLogs(level="WARNING"):  # any end, as nothing says success
+      rows = _evaluate(make, tasks=("swing",))
+    self.assertEqual([row.success for row in rows], [None] * 3)
 
 
 class FilesTest(FolderTest):

@@ -139,6 +139,22 @@ class MappedReplayTest(fixtures.FolderTest):
     with self.assertRaisesRegex(ValueError, "cannot go back"):
       Replay(2, 3, 2).rewind(1)
 
+  def test_rows_overwritten_beyond_the_slack_do_not_come_back(self):
+    for slack in (4, 100):
+      replay = Replay(10, 3, 2, self._folder / str(slack), slack=slack)
+      _fill(replay, range(30))
+      replay.flush()
+      _fill(replay, range(30, 38))  # killed before the next flush
+      again = Replay(10, 3, 2, self._folder / str(slack))
+      again.rewind(30)
+      intact = _numbers(again)
+      self.assertEqual(intact, [*range(20, 30)][-len(intact) :])
+      self.assertLen(intact, 10 if slack == 100 else 6)
+      _fill(again, range(30, 50))
+      again.flush()
+      stored = Replay.stored(self._folder / str(slack))
+      self.assertEqual(_numbers(stored), [*range(40, 50)])
+
   def test_files_are_sparse(self):
     Replay(1_000_000, 59, 4, self._folder)
     used = sum(f.stat().st_blocks * 512 for f in self._folder.iterdir())

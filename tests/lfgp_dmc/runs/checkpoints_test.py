@@ -1,5 +1,6 @@
 """Checkpoints: round trip, thinning, damage, interruption."""
 
+import pathlib
 from unittest import mock
 
 import numpy as np
@@ -124,6 +125,23 @@ class CheckpointsTest(fixtures.FolderTest):
     self._save(1)
     path = checkpoints.save(self._folder, 1, {"step": "again"})
     self.assertEqual(checkpoints.load(path), {"step": "again"})
+    self.assertLen(list(self._folder.iterdir()), 1)
+
+  def test_what_cannot_be_replaced_stays(self):
+    self._save(1)
+    rename = pathlib.Path.rename
+
+    def refused(source, target):
+      if source.name == ".partial-000000001":
+        raise OSError(5, "Input/output error")
+      return rename(source, target)
+
+    with (
+      mock.patch.object(pathlib.Path, "rename", refused),
+      self.assertRaisesRegex(OSError, "Input/output"),
+    ):
+      self._save(1)
+    self.assertEqual(checkpoints.load(self._folder / "000000001"), {"step": 1})
 
   def test_what_cannot_be_stored_is_named(self):
     with self.assertRaisesRegex(TypeError, "'agent/0' is a set"):

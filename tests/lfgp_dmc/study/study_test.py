@@ -94,6 +94,16 @@ class StudyTest(FolderTest):
     self._write("bc", "stack", 1, {700: 1})
     curve = run_results.curve([(self._read(), "stack")])
     np.testing.assert_allclose(curve.scores[:, 0], [[0.5], [0.25]])
+    self.assertEmpty(run_results.uneven(self._read()))
+    self._write(
+      "multitask_bc",
+      "stack",
+      0,
+      {500: 4, 1000: 2},
+      demonstrations="data/a_play",
+    )
+    (run,) = (run for run in self._read() if run.method == "multitask_bc_play")
+    self.assertEqual(run_results.curve([([run], "stack")]).steps, [0])
 
   @parameterized.parameters(
     ("lfgp", {"demonstrations": "data/stack_reset", "transfer_from": ""}),
