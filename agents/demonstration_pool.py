@@ -70,7 +70,7 @@ class ExpertPool:
     standardiser: Standardiser,
     final_rows: int = 1,
   ):
-    """Copies the demonstrations; so many last rows of an attempt are finals.
+    """Copies the demonstrations; an attempt's last `final_rows` are finals.
 
     Raises:
       ValueError: a task has no demonstrations.

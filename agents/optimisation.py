@@ -69,15 +69,6 @@ class Adam:
     return {k: v.cpu().numpy().copy() for k, v in self._state.items()}
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
-    """Restores what `state_dict` returned, or an older run's, by parameter."""
-    if "step" not in state:
-      parts = [state[str(index)] for index in range(len(state))]
-      state = {
-        "step": parts[0]["step"],
-        **{
-          name: np.concatenate([np.ravel(part[name]) for part in parts])
-          for name in _MOMENTS
-        },
-      }
+    """Restores what `state_dict` returned."""
     for name, tensor in self._state.items():
       tensor.copy_(torch.from_numpy(np.array(state[name])))

@@ -13,6 +13,7 @@ from lfgp_dmc.acting import environments, evaluation
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.data.demonstrations import Demonstrations
+from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import command, datasets, encoding, policies, torch_setup
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
@@ -125,17 +126,20 @@ def make_run(
   """The run; raises ValueError if parts do not fit or files are damaged."""
   is_supervised = ALGORITHMS[config.algorithm].is_supervised
   replay = None if is_supervised else make_replay(config, parts, folder.replay)
-  evaluate = functools.partial(
-    evaluation.evaluate,
-    functools.partial(config.environment_spec.build, True),
-    functools.partial(policies.stored_policy, os.fspath(folder.path)),
-    parts.tasks,
-    config.evaluation_episodes,
-    config.evaluation_seed,
-    config.evaluation_workers or command.cores(),
-    progress_bar,
-    draws=config.environment_spec.may_draw,
-  )
+
+  def evaluate(env_step: int) -> list[EvaluationRow]:
+    return evaluation.evaluate(
+      functools.partial(config.environment_spec.build, True),
+      functools.partial(policies.stored_policy, os.fspath(folder.path)),
+      parts.tasks,
+      config.evaluation_episodes,
+      config.evaluation_seed,
+      config.evaluation_workers or command.cores(),
+      progress_bar,
+      env_step,
+      draws=config.environment_spec.may_draw,
+    )
+
   return Run(
     folder,
     make_agent(config, parts, replay),

@@ -70,7 +70,7 @@ def _counted(
   cut = Demonstrations.head
   if config.attempts_per_task:
     wanted, unit = config.attempts_per_task, "attempts"
-    count, cut = operator.attrgetter(unit), Demonstrations.head_attempts
+    count, cut = operator.attrgetter("attempts"), Demonstrations.head_attempts
   short = [
     f"{task} ({count(data)})"
     for task, data in found.items()

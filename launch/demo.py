@@ -24,6 +24,7 @@ from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, demo_video, policies
 from lfgp_dmc.launch.configs import RunConfig
 from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 
 _RUN = flags.DEFINE_string(
   "run", "", "The run's folder; default: a new one under runs/."
@@ -128,7 +129,7 @@ def _cloning(config: RunConfig) -> RunConfig:
 
 def _trained(path: pathlib.Path) -> list[EvaluationRow]:
   """A run's last evaluation."""
-  rows = evaluation_csv.read_csv(path / "evaluation.csv")
+  rows = evaluation_csv.read_csv(RunFolder(path).evaluation)
   return evaluation_csv.newest(rows)
 
 

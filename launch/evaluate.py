@@ -20,9 +20,10 @@ from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
+from lfgp_dmc.runs import run_folder
 from lfgp_dmc.task_names import CONTROL_RATES
 
-_NAME = "evaluation.csv"
+_NAME = run_folder.EVALUATION_NAME
 
 _RUN = flags.DEFINE_string("run", "", "A run's folder, or a policy folder.")
 _EXPERT = flags.DEFINE_enum(

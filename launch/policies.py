@@ -109,7 +109,7 @@ def find(
     (main_task, *(t for t in policy.tasks if t != main_task)),
     path,
     config,
-    int(config.get("policy", {}).get("env_step", 0)),
+    int(config.get(run_folder.POLICY_FIELD, {}).get("env_step", 0)),
   )
 
 

@@ -19,6 +19,7 @@ from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 
 _RUN = flags.DEFINE_string(
@@ -59,14 +60,15 @@ def report(
       f"stopped at {progress.env_step} of {config.env_steps}; continue: {again}"
     )
     return command.INTERRUPTED
-  rows = evaluation_csv.read_csv(path / "evaluation.csv")
+  folder = RunFolder(path)
+  rows = evaluation_csv.read_csv(folder.evaluation)
   is_supervised = configs.ALGORITHMS[config.algorithm].is_supervised
   unit = "updates" if is_supervised else "environment steps"
   print(f"\nsuccess after {progress.env_step} {unit}:")
   print(evaluation_csv.success_table(evaluation_csv.newest(rows)))
-  print(f"\nmetrics      {path / 'metrics.csv'} (and TensorBoard beside it)")
-  print(f"evaluation   {path / 'evaluation.csv'}")
-  print(f"policy       {path / 'policy.safetensors'}")
+  print(f"\nmetrics      {folder.metrics} (and TensorBoard beside it)")
+  print(f"evaluation   {folder.evaluation}")
+  print(f"policy       {path / run_folder.ARRAYS_NAME}")
   return 0
 
 

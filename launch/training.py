@@ -206,7 +206,7 @@ def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
   source = RunFolder(pathlib.Path(config.transfer_from))
   try:
     stored = run_folder.read_config(source.path)
-    tasks = stored["policy"]["tasks"]
+    tasks = stored[run_folder.POLICY_FIELD]["tasks"]
     path = checkpoints.latest(source.checkpoints)
     if path is None:
       raise ValueError(f"{source.path} has no good checkpoint yet")

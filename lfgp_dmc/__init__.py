@@ -107,7 +107,7 @@ class StoredPolicy:
 
 
 def load_policy(
-  run_folder: str | os.PathLike[str], task: str | None = None, seed: int = 0
+  run_folder: str | os.PathLike[str], task: str | None = None
 ) -> StoredPolicy:
   """Loads a trained policy as a plain function.
 
@@ -115,7 +115,6 @@ def load_policy(
     run_folder: `runs/NAME`, or a policy folder (`config.json` and
       `policy.safetensors`).
     task: which of its intentions acts; None is its main task.
-    seed: for policies that draw random numbers; mean actions draw none.
 
   Returns:
     A function from an observation, float32 [O], to an action, float32 [A].
@@ -135,7 +134,6 @@ def load_policy(
       f"{os.fspath(run_folder)} has no intention {task!r}; it has: "
       f"{', '.join(policy.tasks)}"
     )
-  policy.begin(task, seed)
   config = read_config(run_folder)
   options = {"control_hz": config.get("control_hz", 20)}
   if policy.frame_shape and not config.get("environment"):

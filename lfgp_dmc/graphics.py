@@ -86,7 +86,9 @@ def _requested() -> str:
 
 
 def _fault_of(backend: str) -> str:
-  install = f"unset {_EGL_DEVICE}, or " * (_EGL_DEVICE in os.environ) + _INSTALL
+  install = _INSTALL
+  if _EGL_DEVICE in os.environ:
+    install = f"unset {_EGL_DEVICE}, or {install}"
   if backend not in BACKENDS:
     return f"{_GL} is {backend!r}; valid: {', '.join(BACKENDS)}"
   if backend == "off":

@@ -1,6 +1,6 @@
-"""What this process tells libraries: of threads, and of memory.
+"""Settings of this process for libraries: their threads, and memory.
 
-Those of threads read variables when they are loaded.
+Those of threads are variables that libraries read when they are loaded.
 """
 
 import ctypes

@@ -24,7 +24,7 @@ class CudaRecorder:
   """Records on the generator's CUDA device."""
 
   def __init__(self, generator: torch.Generator):
-    """The generator is the only one of updates; replays go on with it."""
+    """The generator is the only source of noise; replays advance it."""
     self._generator = generator
     self._stream = torch.cuda.Stream(generator.device)
 

@@ -5,8 +5,8 @@ import torch
 from lfgp_dmc.agents.losses import Metrics
 from lfgp_dmc.agents.networks import tanh_gaussian
 
-# Of the likelihood: actions nearer to 1 than this have a mean at infinity, and
-# what an expert does the same way each time has a std that goes to 0.
+# Of the likelihood: the mean before the tanh that fits an action of 1 is
+# infinite, and the std that fits what an expert always does alike is 0.
 MOST_ACTION = 0.95
 LEAST_STD = 0.018  # before the tanh
 # Of the divergence: a policy that explores may be as precise as the prior down

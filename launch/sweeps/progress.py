@@ -6,6 +6,7 @@ import pathlib
 
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 
 _ENDLESS = 1 << 62
 
@@ -28,7 +29,7 @@ def last_success(folder: pathlib.Path) -> tuple[str, str]:
   """The last evaluation of the main task: its step, and share of successes."""
   try:
     main_task = str(run_folder.read_config(folder).get("main_task"))
-    rows = evaluation_csv.read_csv(folder / "evaluation.csv")
+    rows = evaluation_csv.read_csv(RunFolder(folder).evaluation)
   except (OSError, ValueError, csv.Error):
     return "", ""
   rows = evaluation_csv.newest(row for row in rows if row.task == main_task)

@@ -46,7 +46,7 @@ class CollectionPlan:
   control_hz: int = 20
   play_steps: int = EPISODE  # at 20 Hz, between resets in play-based collection
   limits: Mapping[str, int] = field(default_factory=lambda: LIMITS)
-  # Of so many reset-based attempts the longest: hard starts are over-sampled.
+  # Keep the longest of this many reset-based attempts: more hard starts.
   keep_longest_of: int = 1
   # [C, H, W, 3], if pairs consist of what a robot senses and of frames.
   frame_shape: tuple[int, ...] = ()

@@ -133,9 +133,10 @@ class _Pile:
   def __init__(self, task: str, pairs: int, finals: int, whole: bool, shape):
     """The finals' attempts are kept whole, or their rows of success alone."""
     self._whole = whole
-    self._task, self._pairs, self._finals = task, pairs, finals
+    self._task, self._pairs = task, pairs
     self._wanted = pairs + finals
     self._rows: list[Transition] = []
+    self._is_last: list[np.ndarray] = []
     self._frames = FrameFile(shape) if shape else None
     self._stored = self._attempts = self._failures = 0
 
@@ -160,40 +161,33 @@ class _Pile:
       return 0
     self._failures = 0
     length = len(attempt.rows.action)
+    start, stop, added = 0, length, 1
     if self._stored < self._pairs:
-      kept = slice(0, min(length, self._pairs - self._stored))
-      self._rows.append(attempt.rows)
-    else:
-      kept = slice(0 if self._whole else length - 1, length)
-      self._rows.append(
-        Transition(*(part[kept.start :] for part in attempt.rows))
-      )
+      stop = added = min(length, self._pairs - self._stored)
+    elif not self._whole:
+      start = length - 1
+    self._rows.append(Transition(*(part[start:stop] for part in attempt.rows)))
+    self._is_last.append(np.arange(start, stop) == length - 1)
     if self._frames is not None:
       assert attempt.frames is not None, "the plan has frames"
-      self._frames.append(attempt.frames[kept.start : kept.stop + 1])
-    added = kept.stop if self._stored < self._pairs else 1
+      self._frames.append(attempt.frames[start : stop + 1])
     self._stored += added
     return added
 
   def collected(self) -> Collected:
     """The pairs, the last attempt cut; then the extra finals."""
     lengths = [len(rows.action) for rows in self._rows]
-    is_last = np.zeros(sum(lengths), np.bool_)
-    is_last[np.cumsum(lengths) - 1] = True
     episode = np.repeat(np.arange(len(lengths), dtype=np.int32), lengths)
     observation, action, next_observation = (
       np.concatenate(parts) for parts in zip(*self._rows, strict=True)
     )
-    kept = np.arange(len(action))
-    if not self._whole:
-      kept = np.r_[kept[: self._pairs], kept[len(kept) - self._finals :]]
     return Collected(
       Demonstrations(
-        observation[kept],
-        action[kept],
-        next_observation[kept],
-        episode[kept],
-        is_last[kept],
+        observation,
+        action,
+        next_observation,
+        episode,
+        np.concatenate(self._is_last),
         frames=None if self._frames is None else self._frames.mapped(),
       ),
       self._attempts,

@@ -8,6 +8,7 @@ from tensorboard.compat.proto import event_pb2, summary_pb2
 from tensorboard.summary.writer import event_file_writer
 
 from lfgp_dmc.data import csv_files, files
+from lfgp_dmc.runs.run_folder import RunFolder
 
 
 class MetricsLog:
@@ -15,7 +16,7 @@ class MetricsLog:
 
   def __init__(self, folder: files.Path):
     """Opens the log of a run's folder, and continues one that exists."""
-    self._path = pathlib.Path(folder) / "metrics.csv"
+    self._path = RunFolder(pathlib.Path(folder)).metrics
     self._columns: list[str] = []
     if self._path.exists():
       self._columns, _ = csv_files.read(self._path, is_log=True)

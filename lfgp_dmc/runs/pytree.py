@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 
 _ARRAY = "__array__"
-_ITEMS = "__items__"  # a dict whose keys are not all text
 
 
 def pack(state: Any) -> tuple[dict[str, np.ndarray], Any]:
   """Splits a nested state into the arrays by flat name and the JSON tree.
 
   Raises:
-    TypeError: a leaf of another type; the message says where.
+    TypeError: a leaf or a key of another type; the message says where.
   """
   arrays: dict[str, np.ndarray] = {}
   return arrays, _pack(state, "", arrays)
@@ -35,8 +34,6 @@ def unpack(arrays: Mapping[str, np.ndarray], tree: Any) -> Any:
     return tree
   if tree.keys() == {_ARRAY}:
     return arrays[tree[_ARRAY]]
-  if tree.keys() == {_ITEMS}:
-    return {key: unpack(arrays, value) for key, value in tree[_ITEMS]}
   return {key: unpack(arrays, value) for key, value in tree.items()}
 
 
@@ -54,20 +51,19 @@ def flattened(
 def _pack(value: Any, name: str, arrays: dict[str, np.ndarray]) -> Any:
   if isinstance(value, np.ndarray):
     unique = name
-    while unique in arrays:  # the keys 0 and "0" would share a name
+    while unique in arrays:  # "a/b" may be one key, or two
       unique += "_"
     arrays[unique] = value
     return {_ARRAY: unique}
   if isinstance(value, np.generic):
     return value.item()
   if isinstance(value, Mapping):
-    packed = [
-      (key, _pack(item, f"{name}/{key}" if name else str(key), arrays))
+    if not all(isinstance(key, str) for key in value):
+      raise TypeError(f"state {name!r} has keys {[*value]}; valid: text")
+    return {
+      key: _pack(item, f"{name}/{key}" if name else key, arrays)
       for key, item in value.items()
-    ]
-    if all(isinstance(key, str) for key in value):
-      return dict(packed)
-    return {_ITEMS: [list(pair) for pair in packed]}
+    }
   if isinstance(value, list | tuple):
     return [_pack(v, f"{name}/{i}", arrays) for i, v in enumerate(value)]
   if value is None or isinstance(value, bool | int | float | str):

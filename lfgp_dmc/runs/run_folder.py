@@ -17,6 +17,8 @@ from lfgp_dmc.runs import pytree
 
 CONFIG_NAME = "config.json"
 ARRAYS_NAME = "policy.safetensors"
+EVALUATION_NAME = "evaluation.csv"
+METRICS_NAME = "metrics.csv"
 # Added to the config by the run: the options of the policy's arrays, so that
 # its folder is a policy folder too.
 POLICY_FIELD = "policy"
@@ -36,7 +38,12 @@ class RunFolder:
   @property
   def evaluation(self) -> pathlib.Path:
     """A row an evaluation episode, CSV."""
-    return self.path / "evaluation.csv"
+    return self.path / EVALUATION_NAME
+
+  @property
+  def metrics(self) -> pathlib.Path:
+    """A row of means every `log_every` steps, CSV."""
+    return self.path / METRICS_NAME
 
   @property
   def checkpoints(self) -> pathlib.Path:
@@ -141,10 +148,7 @@ def read_config(path: files.Path) -> dict[str, Any]:
     raise ValueError(f"no run folder {path}")
   if not (path / CONFIG_NAME).is_file():
     raise ValueError(f"{path} is not a run: it has no {CONFIG_NAME}")
-  try:
-    config = files.read_json(path / CONFIG_NAME)
-  except ValueError as error:
-    raise ValueError(str(error)) from None
+  config = files.read_json(path / CONFIG_NAME)
   if not isinstance(config, dict) or not isinstance(
     config.get(POLICY_FIELD, {}), dict
   ):

@@ -75,7 +75,7 @@ def read(path: files.Path) -> Results:
         if not 0 <= float(success) <= 1:
           raise ValueError(f"success is {success}; valid: 0 to 1")
         seeds[seed] = Result(float(success), episodes, hours)
-        hours = np.nan  # of cloning: not told
+        hours = np.nan  # of cloning: not recorded
     except ValueError as error:
       raise ValueError(f"{path}, line {line}: {error}") from None
   if not results:

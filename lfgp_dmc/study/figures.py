@@ -152,7 +152,7 @@ def _left_out(
   """What the panel of all tasks lacks of a method that has runs on each."""
   most = max(len(runs) for runs, _ in strata)
   if not all(runs for runs, _ in strata):
-    return []  # told otherwise
+    return []  # `_notes` says so
   if curve is None:
     return [f"{style.label} has no seed and step in common of all tasks"]
   if len(curve.scores) < most:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lfgp_dmc.data import csv_files, evaluation_csv, files
+from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.study import drawing, run_results
 
 NAME = "learning_curve.png"  # in the run's folder
@@ -94,7 +95,7 @@ def draw(path: files.Path, output: files.Path) -> None:
 def _logged(path: pathlib.Path) -> dict[str, Curves]:
   """What is finite of each quantity."""
   logged: dict[str, Curves] = defaultdict(lambda: defaultdict(list))
-  evaluation, metrics = path / "evaluation.csv", path / "metrics.csv"
+  evaluation, metrics = RunFolder(path).evaluation, RunFolder(path).metrics
   if evaluation.is_file():
     at_step = operator.attrgetter("env_step")  # later commands append rows
     rows = sorted(evaluation_csv.read_csv(evaluation), key=at_step)

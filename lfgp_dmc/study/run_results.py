@@ -10,6 +10,7 @@ import numpy as np
 
 from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 
 SUCCESS, RETURN = "success", "return"
 QUANTITIES = (SUCCESS, RETURN)
@@ -47,7 +48,7 @@ def read_runs(folders: Sequence[files.Path]) -> tuple[list[Run], list[str]]:
   notes = []
   for path in _expanded(folders):
     config = read_config(path)
-    evaluation = path / "evaluation.csv"
+    evaluation = RunFolder(path).evaluation
     rows = evaluation_csv.read_csv(evaluation) if evaluation.is_file() else []
     if not rows:
       notes.append(f"{path}: nothing was evaluated yet, left out")

@@ -12,7 +12,7 @@ from tests import fixtures
 _STATE = {
   "agent": {
     "weights": np.arange(6, dtype=np.float32).reshape(2, 3).T,
-    "optimizer": {0: {"step": np.asarray(3, np.int64)}, 1: [np.ones(2), None]},
+    "optimizer": [{"step": np.asarray(3, np.int64)}, [np.ones(2), None]],
     "mask": np.array([True, False]),
     "random": np.random.default_rng(0).bit_generator.state,
   },
@@ -146,3 +146,5 @@ class CheckpointsTest(fixtures.FolderTest):
   def test_what_cannot_be_stored_is_named(self):
     with self.assertRaisesRegex(TypeError, "'agent/0' is a set"):
       pytree.pack({"agent": [set()]})
+    with self.assertRaisesRegex(TypeError, r"'agent' has keys \[0\]"):
+      pytree.pack({"agent": {0: 1}})
