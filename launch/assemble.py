@@ -9,7 +9,7 @@ import dm_env
 import torch
 
 from lfgp_dmc import seeding
-from lfgp_dmc.acting import environments, evaluation
+from lfgp_dmc.acting import environments, evaluation, wrappers
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.data.demonstrations import Demonstrations
@@ -62,7 +62,7 @@ def make_parts(config: RunConfig, folder: pathlib.Path | None = None) -> Parts:
   if not shape or ALGORITHMS[config.algorithm].is_supervised:
     return Parts(environment, tasks, widths, found, device, shape)
   clone = encoding.clone_of(config, folder, shape)
-  environment = environments.with_features(environment, clone.encode)
+  environment = wrappers.with_features(environment, clone.encode)
   found = {
     k: encoding.with_features(k, data, clone) for k, data in found.items()
   }

@@ -3,6 +3,7 @@
 `python launch/collect_demonstrations.py --task=stack --output=data/stack`
 """
 
+import contextlib
 import dataclasses
 import functools
 import pathlib
@@ -147,8 +148,11 @@ def _plan() -> CollectionPlan:
   shape: tuple[int, ...] = ()
   if _CAMERA.value:
     options |= {"observations": "vision", "camera_size": _CAMERA.value}
-    with command.checked_input():
-      shape = environments.frame_shape(lfgp_dmc.load(_TASK.value, **options))
+    with (
+      command.checked_input(),
+      contextlib.closing(lfgp_dmc.load(_TASK.value, **options)) as environment,
+    ):
+      shape = environments.frame_shape(environment)
     if not seen:  # other experts than policies from pixels need the state
       options["observations"] = "all"
   return CollectionPlan(

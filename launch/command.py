@@ -96,10 +96,14 @@ def _show_help_of(module: str) -> None:
 
 
 def guarded(main: Callable[[], int | None]) -> int | None:
-  """Calls a command; reports bad input and failing disks in a line."""
+  """Calls a command; reports bad input and failing disks in a line.
+
+  With --verbosity=1 the place is shown, too: it may be a fault of ours.
+  """
   try:
     return main()
   except UserError as error:
+    absl_logging.debug("raised here:", exc_info=error)
     return _fail(str(error))
   except BrokenPipeError:  # such as `| head`
     return 1

@@ -12,7 +12,7 @@ import dm_env
 
 import lfgp_dmc
 from lfgp_dmc import graphics
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import environments, wrappers
 from lfgp_dmc.observations import SUCCESS_PREFIX
 from lfgp_dmc.task_names import CONTROL_RATES, check_task, task_set
 
@@ -40,7 +40,7 @@ class EnvironmentSpec:
     if self.environment:
       made = _imported(self.environment)(seed)
       try:
-        return environments.with_unit_actions(made)
+        return wrappers.with_unit_actions(made)
       except (AttributeError, ValueError) as error:
         raise ValueError(f"{_FIELD}={self.environment}: {error}") from None
     seen: dict[str, Any] = {}

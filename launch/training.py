@@ -9,19 +9,15 @@ from typing import Any
 import numpy as np
 from absl import logging
 
-from lfgp_dmc.agents.lfgp.agent import LfgpAgent
-from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import files
 from lfgp_dmc.data.demonstration_checks import FRAMES
 from lfgp_dmc.data.demonstrations import Demonstrations
-from lfgp_dmc.data.replay import Replay
-from lfgp_dmc.launch import assemble, command, sizes
+from lfgp_dmc.launch import assemble, command, sizes, sources
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.configs import RunConfig, from_dict
 from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
-from lfgp_dmc.types import Agent
 
 # What bad input raises while a run is made.
 _INPUT = (ValueError, OSError, OverflowError)
@@ -84,7 +80,7 @@ def _train(
   try:
     run = assemble.make_run(config, parts, folder, progress_bar)
     if not (resume and run.restore()):
-      _initialise(config, run.agent, run.replay)
+      sources.take_over(config, run.agent, run.replay)
     is_useless = False
     return run.train()
   except BaseException as error:
@@ -156,71 +152,3 @@ def write_untrained_policy(config: RunConfig, folder: pathlib.Path) -> None:
 
 def _with_newer_fields(stored: dict[str, Any]) -> dict[str, Any]:
   return from_dict(stored).to_dict()
-
-
-def _initialise(config: RunConfig, agent: Agent, replay: Replay | None) -> None:
-  """Takes over what `transfer_from` and `init_from` name."""
-  if not (config.transfer_from or config.init_from):
-    return
-  assert isinstance(agent, LfgpAgent) and replay is not None, "was checked"
-  if config.transfer_from:
-    _transfer(config, agent, replay)
-  if config.init_from:
-    policy = Policy.load(config.init_from)
-    stored = run_folder.read_config(config.init_from)
-    _check_source(config, "init_from", stored)
-    agent.start_from(policy)
-    print(f"the intentions start as those of {config.init_from}")
-
-
-def _check_source(
-  config: RunConfig, field: str, stored: dict[str, Any]
-) -> None:
-  """Raises ValueError if what is taken over means other steps or inputs.
-
-  Sizes of arrays do not tell.
-  """
-  path = getattr(config, field)
-  rate = stored.get("control_hz", config.control_hz)
-  if rate != config.control_hz and not config.environment:
-    raise ValueError(
-      f"config.control_hz is {config.control_hz}; {field} {path} has {rate}"
-    )
-  own = dataclasses.asdict(config.agent.inputs)
-  theirs = {
-    **stored.get("agent", {}).get("inputs", {}),
-    **stored.get(run_folder.POLICY_FIELD, {}),
-  }
-  for name, value in own.items():
-    # Standardisation comes along with the networks, if they have it.
-    is_brought = name == "standardise" and not value
-    if theirs.get(name, value) != value and not is_brought:
-      raise ValueError(
-        f"config.agent.inputs.{name} is {value}; {field} {path} has "
-        f"{theirs[name]}"
-      )
-
-
-def _transfer(config: RunConfig, agent: LfgpAgent, replay: Replay) -> None:
-  """Section 5.3 of the paper: networks by task name, and the whole replay."""
-  source = RunFolder(pathlib.Path(config.transfer_from))
-  try:
-    stored = run_folder.read_config(source.path)
-    tasks = stored[run_folder.POLICY_FIELD]["tasks"]
-    path = checkpoints.latest(source.checkpoints)
-    if path is None:
-      raise ValueError(f"{source.path} has no good checkpoint yet")
-    networks = checkpoints.load(path)["agent"]["learner"]["networks"]
-  except KeyError as error:
-    raise ValueError(
-      f"config.transfer_from: {source.path} is no run to transfer from: it has "
-      f"no {error}"
-    ) from None
-  except ValueError as error:
-    raise ValueError(f"config.transfer_from: {error}") from None
-  _check_source(config, "transfer_from", stored)
-  agent.carry_over(
-    networks, tasks, config.transfer_updates, config.transfer_main_head
-  )
-  rows = replay.copy_from(Replay.stored(source.replay))
-  print(f"took over {path.name} of {source.path} with {rows} transitions")

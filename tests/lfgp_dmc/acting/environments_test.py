@@ -5,7 +5,7 @@ from absl.testing import absltest, parameterized
 from dm_env import specs
 
 from lfgp_dmc import observations, toy
-from lfgp_dmc.acting import environments
+from lfgp_dmc.acting import environments, wrappers
 
 
 class _Foreign(toy.PointEnvironment):
@@ -36,7 +36,7 @@ class UnitActionsTest(parameterized.TestCase):
   def test_rescales_to_the_bounds(self, shape, low, high, action, expected):
     spec = specs.BoundedArray(shape, np.float64, low, high)
     foreign = _Foreign(spec)
-    env = environments.with_unit_actions(foreign)
+    env = wrappers.with_unit_actions(foreign)
     env.reset()
     self.assertTrue(env.step(np.asarray(action, np.float32)).mid())
     np.testing.assert_allclose(foreign.action, expected)
@@ -48,7 +48,7 @@ class UnitActionsTest(parameterized.TestCase):
 
   def test_unit_actions_are_left_alone(self):
     env = toy.PointEnvironment()
-    self.assertIs(environments.with_unit_actions(env), env)
+    self.assertIs(wrappers.with_unit_actions(env), env)
 
   @parameterized.parameters(
     specs.DiscreteArray(4),
@@ -59,7 +59,7 @@ class UnitActionsTest(parameterized.TestCase):
   )
   def test_refuses_what_cannot_be_learned(self, spec):
     with self.assertRaisesRegex(ValueError, "valid: floats with finite bounds"):
-      environments.with_unit_actions(_Foreign(spec))
+      wrappers.with_unit_actions(_Foreign(spec))
 
   @parameterized.parameters(
     [[specs.Array((2,), np.float32)]],
@@ -103,7 +103,7 @@ class FlattenerTest(absltest.TestCase):
     def encode(frames):
       return frames[:, :, 0, 0, 0].astype(np.float32)
 
-    encoded = environments.with_features(_Cameras(), encode)
+    encoded = wrappers.with_features(_Cameras(), encode)
     observed = encoded.reset().observation
     flat = environments.flattener(encoded)(observed)
     np.testing.assert_array_equal(flat[2:], [1, 2])
