@@ -12,6 +12,7 @@ from lfgp_dmc import seeding
 from lfgp_dmc.acting import environments, evaluation, wrappers
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
@@ -26,7 +27,7 @@ from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 
 class Parts(NamedTuple):
-  """What an agent is built from."""
+  """What is read and built before a run's folder is made."""
 
   environment: dm_env.Environment
   tasks: tuple[str, ...]  # that are learned, the main task first
@@ -106,17 +107,20 @@ def make_agent(
   """The config's agent; raises ValueError if the parts do not fit it."""
   return ALGORITHMS[config.algorithm].build(
     config.agent,
-    parts.tasks,
-    parts.demonstrations,
-    replay,
-    seeding.derive(config.seed, "agent"),
-    parts.device,
-    *parts.widths,
-    bfloat16=torch_setup.uses_bfloat16(config, parts.device),
-    threads=config.threads or command.cores(),
-    cuda_graphs=config.cuda_graphs,
-    frame_shape=parts.frame_shape,
-    encoder=parts.encoder,
+    AgentParts(
+      tasks=parts.tasks,
+      demonstrations=parts.demonstrations,
+      replay=replay,
+      seed=seeding.derive(config.seed, "agent"),
+      device=parts.device,
+      observation_size=parts.widths[0],
+      action_size=parts.widths[1],
+      bfloat16=torch_setup.uses_bfloat16(config, parts.device),
+      threads=config.threads or command.cores(),
+      cuda_graphs=config.cuda_graphs,
+      frame_shape=parts.frame_shape,
+      encoder=parts.encoder,
+    ),
   )
 
 

@@ -1,12 +1,18 @@
 """Behaviour cloning, of the main task alone or of all tasks at once."""
 
+from typing import TYPE_CHECKING
+
 from lfgp_dmc.agents.bc.config import BcConfig
+from lfgp_dmc.agents.parts import AgentParts
+
+if TYPE_CHECKING:
+  from lfgp_dmc.agents.bc.agent import BcAgent
 
 __all__ = ["BcConfig", "build"]
 
 
-def build(*parts, **options):
+def build(config: BcConfig, parts: AgentParts) -> "BcAgent":
   """See `agent.build`; loads torch only now."""
   from lfgp_dmc.agents.bc import agent
 
-  return agent.build(*parts, **options)
+  return agent.build(config, parts)

@@ -20,8 +20,8 @@ from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.encoder import Encoder
 from lfgp_dmc.agents.networks.intentions import IntentionNetwork, to_std
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.data import files
-from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.types import Metrics
 
 _LOSS = "behaviour_cloning"
@@ -148,55 +148,39 @@ class BcAgent:
     self._order = []
 
 
-def build(
-  config: BcConfig,
-  tasks: Sequence[str],
-  demonstrations: Mapping[str, Demonstrations],
-  replay: object,
-  seed: int,
-  device: torch.device | str,
-  observation_size: int,
-  action_size: int,
-  *,
-  bfloat16: bool = False,
-  frame_shape: Sequence[int] = (),
-  **unused: object,
-) -> BcAgent:
-  """Builds a BC agent; arguments as of `agents.lfgp.build`, the replay unused.
-
-  With frames, [C, H, W, 3] each, observations are what comes before the pixels.
+def build(config: BcConfig, parts: AgentParts) -> BcAgent:
+  """Builds a BC agent, which sees frames if there are any.
 
   Raises:
     ValueError: demonstrations are missing, too few, or of other sizes.
   """
-  del replay, unused
-  device = torch.device(device)
+  device, seed, tasks = torch.device(parts.device), parts.seed, parts.tasks
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   encoder, seen = None, config.encoder
-  if frame_shape:
+  if parts.frame_shape:
     sizes = seen.features, seen.channels
-    encoder = Encoder(frame_shape, *sizes, initial).to(device)
+    encoder = Encoder(parts.frame_shape, *sizes, initial).to(device)
   standardiser = make_standardiser(
     config.inputs,
-    demonstrations,
+    parts.demonstrations,
     tasks,
-    observation_size,
-    action_size,
-    seen.features if frame_shape else 0,
+    parts.observation_size,
+    parts.action_size,
+    seen.features if parts.frame_shape else 0,
   ).to(device)
   network = layouts.make_intentions(
     config.networks.layout,
     standardiser,
     len(tasks),
     config.networks.hidden_size,
-    action_size,
+    parts.action_size,
     initial,
     encoder=encoder,
   ).to(device)
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
+  dtype = torch.bfloat16 if parts.bfloat16 else torch.float32
   network.flatten(dtype)
   split, share = seeding.generator(seed, "split"), config.validation_share
-  which = demonstrations, tasks, standardiser, share, split
+  which = parts.demonstrations, tasks, standardiser, share, split
   if encoder is None:
     pairs = SplitPairs(*which)
   else:

@@ -1,7 +1,7 @@
 """Builds the agent: its config is taken apart here, a group for each part."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import torch
 
@@ -26,59 +26,43 @@ from lfgp_dmc.agents.lfgp.prior import Prior
 from lfgp_dmc.agents.lfgp.reward_source import RewardSource
 from lfgp_dmc.agents.lfgp.second_thread import SecondThread
 from lfgp_dmc.agents.lfgp.stored_reward import StoredRewards
-from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.agents.schedulers import make_scheduler
-from lfgp_dmc.data.demonstrations import Demonstrations
-from lfgp_dmc.data.replay import Replay
 
 
-def build(
-  config: LfgpConfig,
-  tasks: Sequence[str],
-  demonstrations: Mapping[str, Demonstrations],
-  replay: Replay,
-  seed: int,
-  device: torch.device | str,
-  observation_size: int,
-  action_size: int,
-  *,
-  bfloat16: bool = False,
-  threads: int = 1,
-  cuda_graphs: bool = True,
-  encoder: Encoder | None = None,
-  **unused: object,
-) -> LfgpAgent:
-  """Builds an LfGP agent; all its random numbers follow from the seed.
-
-  The replay is filled by the training loop. With `bfloat16`, parameters stay
-  float32; of two CPU `threads`, one trains discriminators, if there are any;
-  with `cuda_graphs`, a GPU records updates, then replays them. From pixels, the
-  frozen `encoder` has made the features of all observations, and is stored with
-  the intentions.
+def build(config: LfgpConfig, parts: AgentParts) -> LfgpAgent:
+  """Builds an LfGP agent.
 
   Raises:
     ValueError: demonstrations, stored rewards, scheduler or number of examples
       do not fit.
   """
-  del unused
-  device = torch.device(device)
-  dtype = torch.bfloat16 if bfloat16 else torch.float32
+  replay, tasks, seed = parts.replay, parts.tasks, parts.seed
+  assert replay is not None, "LfGP acts"
+  device = torch.device(parts.device)
+  dtype = torch.bfloat16 if parts.bfloat16 else torch.float32
   random = functools.partial(seeding.generator, seed)
-  used = demonstrations if config.uses_demonstrations else None
-  standardiser = make_standardiser(
-    config.inputs, used, tasks, observation_size, action_size
-  ).to(device)
+  sizes = parts.observation_size, parts.action_size
+  used = parts.demonstrations if config.uses_demonstrations else None
+  standardiser = make_standardiser(config.inputs, used, tasks, *sizes)
+  standardiser = standardiser.to(device)
   experts = None
   if used is not None:
     experts = ExpertPool(used, tasks, standardiser, config.final_rows)
   initial = torch.Generator().manual_seed(seeding.derive(seed, "networks"))
   networks = make_networks(
-    config, len(tasks), action_size, standardiser, initial, device, encoder
+    config,
+    len(tasks),
+    parts.action_size,
+    standardiser,
+    initial,
+    device,
+    parts.encoder,
   )
   noise = torch.Generator(device).manual_seed(seeding.derive(seed, "noise"))
   columns = replay.reward_columns(tasks) if config.keeps_rewards else []
-  learner = make_learner(
-    config, networks, noise, dtype, columns, threads, cuda_graphs
+  learner = _make_learner(
+    config, networks, noise, dtype, columns, parts.threads, parts.cuda_graphs
   )
   batches = BatchMaker(
     config, replay, columns, experts, standardiser, random("sampling")
@@ -95,14 +79,14 @@ def build(
   )
 
 
-def make_learner(
+def _make_learner(
   config: LfgpConfig,
   networks: LfgpNetworks,
   generator: torch.Generator,
-  dtype: torch.dtype = torch.float32,
-  stored_columns: Sequence[int] = (),
-  threads: int = 1,
-  cuda_graphs: bool = False,
+  dtype: torch.dtype,
+  stored_columns: Sequence[int],
+  threads: int,
+  cuda_graphs: bool,
 ) -> LfgpLearner:
   """Builds what trains the networks; noise is from `generator`.
 

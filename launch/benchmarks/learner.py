@@ -13,6 +13,7 @@ from lfgp_dmc.agents import synthetic
 from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.lfgp.config import DiscriminatorReward, PretrainingConfig
 from lfgp_dmc.agents.networks import layouts
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch.benchmarks import profiling
 from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
@@ -163,15 +164,19 @@ def make_agent(
       pretraining=PretrainingConfig(),
       critic=dataclasses.replace(config.agent.critic, warmup_updates=0),
     ),
-    tasks,
-    synthetic.demonstrations(tasks, _PAIRS, size, _ACTION_SIZE),
-    replay,
-    config.seed,
-    torch.device("cpu"),
-    size,
-    _ACTION_SIZE,
-    bfloat16=config.bfloat16,
-    threads=threads,
+    AgentParts(
+      tasks=tasks,
+      demonstrations=synthetic.demonstrations(
+        tasks, _PAIRS, size, _ACTION_SIZE
+      ),
+      replay=replay,
+      seed=config.seed,
+      device="cpu",
+      observation_size=size,
+      action_size=_ACTION_SIZE,
+      bfloat16=config.bfloat16,
+      threads=threads,
+    ),
   )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from lfgp_dmc.agents import bc, lfgp
 from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
 
@@ -15,7 +16,7 @@ class Algorithm:
   """How an algorithm is made from a run's config."""
 
   agent_config: type[LfgpConfig] | type[BcConfig]
-  build: Callable[..., ActingAgent | SupervisedAgent]  # see `lfgp.build`
+  build: Callable[[Any, AgentParts], ActingAgent | SupervisedAgent]
   # Config fields by dotted name, and groups that presets leave alone.
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
   without: tuple[str, ...] = ()

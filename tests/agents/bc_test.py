@@ -162,4 +162,4 @@ class ContractTest(parameterized.TestCase):
   def test_other_sizes_are_refused(self):
     shown = fixtures.demonstrations()
     with self.assertRaisesRegex(ValueError, "the environment has \\(3, 2\\)"):
-      build(BcConfig(), TASKS, shown, None, 0, "cpu", 3, A)
+      build(BcConfig(), fixtures.parts(TASKS, shown, sizes=(3, A)))

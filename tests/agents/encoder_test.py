@@ -111,7 +111,8 @@ class CloningTest(absltest.TestCase):
     )
     shape = _SHAPE
     agent = bc.build(
-      config, ("t",), {"t": data}, None, 0, "cpu", 5, 2, frame_shape=shape
+      config,
+      fixtures.parts(("t",), {"t": data}, sizes=(5, 2), frame_shape=shape),
     )
     for _ in range(60):
       for _ in range(agent.begin_epoch()):

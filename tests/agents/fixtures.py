@@ -18,6 +18,8 @@ from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.demonstration_pool import ExpertPool
 from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.networks.trunk import Standardiser
+from lfgp_dmc.agents.parts import AgentParts
+from lfgp_dmc.data.demonstrations import Demonstrations
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import loop, metrics, pytree
 from lfgp_dmc.runs.schedule import TrainSchedule
@@ -73,9 +75,30 @@ def make_agent(
     shown = demonstrations(tasks, *sizes)
   if replay is None:
     replay = synthetic.replay(synthetic.transitions(200, *sizes))
-  settings = config(**fields)
-  fixed = (tasks, shown, replay, seed, "cpu", *sizes)
-  return lfgp.build(settings, *fixed, bfloat16=bfloat16, threads=threads)
+  made = parts(tasks, shown, replay, seed, sizes, bfloat16=bfloat16,
+               threads=threads)  # fmt: skip
+  return lfgp.build(config(**fields), made)
+
+
+def parts(
+  tasks: Sequence[str],
+  shown: Mapping[str, Demonstrations],
+  replay: Replay | None = None,
+  seed: int = 0,
+  sizes: tuple[int, int] = (OBS, A),
+  **options: Any,
+) -> AgentParts:
+  """What an agent is built from, on the CPU."""
+  return AgentParts(
+    tasks=tuple(tasks),
+    demonstrations=shown,
+    replay=replay,
+    seed=seed,
+    device="cpu",
+    observation_size=sizes[0],
+    action_size=sizes[1],
+    **options,
+  )
 
 
 def make_learner(*args: Any, **fields: Any):
@@ -93,10 +116,8 @@ def make_bc(tasks: Sequence[str] = TASKS, seed: int = 0, **fields: Any):
   }
   bfloat16 = fields.pop("bfloat16", False)
   settings = BcConfig(**nested({**small, **fields}))
-  shown = demonstrations(tasks)
-  return bc.build(
-    settings, tasks, shown, None, seed, "cpu", OBS, A, bfloat16=bfloat16
-  )
+  made = parts(tasks, demonstrations(tasks), seed=seed, bfloat16=bfloat16)
+  return bc.build(settings, made)
 
 
 def pool() -> ExpertPool:

@@ -6,6 +6,7 @@ from absl.testing import parameterized
 
 from lfgp_dmc import task_names, types
 from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.launch import configs
 
@@ -16,13 +17,15 @@ class AgentContractTest(parameterized.TestCase):
     algorithm, tasks = configs.ALGORITHMS[name], task_names.task_set("stack")
     agent = algorithm.build(
       configs.from_dict(configs.make_config(name).to_dict()).agent,
-      tasks,
-      synthetic.demonstrations(tasks, 60, 3, 2),
-      Replay(4, 3, 2, reward_tasks=tasks),
-      0,
-      "cpu",
-      3,
-      2,
+      AgentParts(
+        tasks=tasks,
+        demonstrations=synthetic.demonstrations(tasks, 60, 3, 2),
+        replay=Replay(4, 3, 2, reward_tasks=tasks),
+        seed=0,
+        device="cpu",
+        observation_size=3,
+        action_size=2,
+      ),
     )
     is_supervised = algorithm.is_supervised
     kind = types.SupervisedAgent if is_supervised else types.ActingAgent
