@@ -56,6 +56,13 @@ class SplitTest(parameterized.TestCase):
     self.assertEqual(len(set(large[:70])), 70)
     np.testing.assert_array_equal(np.unique(small), pairs.train_rows[1])
 
+  def test_each_epoch_has_an_order_of_its_own(self):
+    agent, orders = make_bc(), []
+    for _ in range(2):
+      agent.begin_epoch()
+      orders.append(torch.stack(agent._order))
+    self.assertFalse(torch.equal(*orders))
+
   def test_a_batch_holds_each_tasks_own_rows(self):
     pairs = self._pairs((100, 50))
     order = pairs.shuffled(np.random.default_rng(1), 16)
@@ -82,6 +89,21 @@ class LossTest(absltest.TestCase):
         self.assertAlmostEqual(found, by_task[-1], places=5)
       found = metrics[f"loss/{part}"]
       self.assertAlmostEqual(found, np.mean(by_task), places=5)
+
+  def test_validation_is_by_the_loss_that_is_trained(self):
+    agent, made = make_bc(loss="likelihood"), fixtures.demonstrations()
+    heads = agent._network.heads
+    heads.set_std(1.0)
+    with torch.no_grad():
+      heads.output.weight[..., :A] = 0.0
+      heads.output.bias[..., :A] = 0.0
+    for index, found in enumerate(agent.validation_losses()):
+      rows = agent._pairs.validation_rows[index] - 100 * index
+      action = made[TASKS[index]].action[rows]
+      # N(0, 1) before the tanh: 0.5 v^2 + 0.5 ln(2 pi) + ln(1 - a^2).
+      by_float = 0.5 * np.arctanh(action) ** 2 + np.log(1 - action**2)
+      by_hand = (by_float + 0.918939).sum(1).mean()
+      self.assertAlmostEqual(found, by_hand, places=4)
 
   def test_the_loss_trains_trunk_and_heads(self):
     agent = make_bc()
@@ -122,8 +144,10 @@ class EarlyStopTest(absltest.TestCase):
 
 
 class ContractTest(parameterized.TestCase):
-  def test_resumes_to_the_same_numbers(self):
-    agent, other = make_bc(), make_bc(seed=3)
+  @parameterized.parameters(False, True)
+  def test_resumes_to_the_same_numbers(self, bfloat16):
+    agent = make_bc(bfloat16=bfloat16)
+    other = make_bc(seed=3, bfloat16=bfloat16)
     for _ in range(2):
       _epoch(agent)
     other._pairs = agent._pairs  # the split follows from the seed
@@ -133,6 +157,20 @@ class ContractTest(parameterized.TestCase):
         _epoch(one)
     self.assertEqual(agent.metrics(), other.metrics())
     fixtures.assert_same_policy(agent, other)
+
+  def test_network_split_and_order_follow_from_the_seed(self):
+    first, again, other = (make_bc(seed=seed) for seed in (3, 3, 4))
+    for part in (
+      lambda agent: agent.policy.arrays()["heads.output.bias"],
+      lambda agent: agent._pairs.validation_rows[0],
+      lambda agent: agent._shuffling.bit_generator.state["state"]["state"],
+    ):
+      np.testing.assert_array_equal(part(first), part(again))
+      self.assertFalse(np.array_equal(part(first), part(other)))
+
+  def test_the_share_of_validation_is_the_configs(self):
+    pairs = make_bc(validation_share=0.5)._pairs
+    self.assertEqual([*map(len, pairs.validation_rows)], [50] * len(TASKS))
 
   def test_metrics_keep_their_names(self):
     agent = make_bc()

@@ -2,8 +2,25 @@
 
 from absl.testing import parameterized
 
+from lfgp_dmc.agents.bc import BcConfig
+from lfgp_dmc.agents.fields import positions
 from lfgp_dmc.agents.lfgp.config import LfgpConfig
 from tests.agents import fixtures
+
+
+class BcConfigTest(parameterized.TestCase):
+  def test_defaults_are_the_papers_table(self):
+    table = {
+      "batch_size": 256,
+      "learning_rate": 3e-4,
+      "loss": "squared_error",
+      "networks.hidden_size": 256,
+      "networks.layout": "separate",
+      "optimiser.max_gradient_norm": 0.0,
+      "overfit_tolerance": 100,
+      "validation_share": 0.3,
+    }
+    self.assertEqual(BcConfig(**fixtures.nested(table)), BcConfig())
 
 
 class LfgpConfigTest(parameterized.TestCase):
@@ -58,6 +75,19 @@ class LfgpConfigTest(parameterized.TestCase):
   def test_errors_say_what_is_valid(self, name, value, valid):
     with self.assertRaisesRegex(ValueError, valid):
       fixtures.config(**{name: value})
+
+  @parameterized.parameters(
+    ({}, False),
+    ({"inputs.standardise": True}, True),
+    ({"networks.actor_trunk": "own", "pretraining.updates": 1}, True),
+  )
+  def test_what_needs_demonstrations_beside_stored_rewards(self, fields, does):
+    config = fixtures.config(**{"reward.kind": "stored", **fields})
+    self.assertEqual(config.uses_demonstrations, does)
+
+  def test_slices_name_all_their_places(self):
+    self.assertEqual(positions("3:6,53:55"), (3, 4, 5, 53, 54))
+    self.assertEqual(positions(""), ())
 
   @parameterized.parameters(
     ("reward.share is 1.0", {"reward.kind": "examples", "reward.share": 1.0}),

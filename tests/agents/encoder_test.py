@@ -1,16 +1,21 @@
 """The encoder: what it sees, and that it learns from what it sees alone."""
 
 import dataclasses
+from unittest import mock
 
 import numpy as np
 import torch
 from absl.testing import absltest, parameterized
 
 from lfgp_dmc.agents import bc, serialisation, vision
+from lfgp_dmc.agents.bc import pixel_pairs
+from lfgp_dmc.agents.bc.pixel_pairs import PixelPairs
 from lfgp_dmc.agents.networks import encoder as encoders
 from lfgp_dmc.agents.networks.encoder import Encoder
+from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.vision import EncoderConfig
 from tests import fixtures
+from tests.agents.fixtures import parts
 
 _SHAPE = (2, 32, 32, 3)
 
@@ -91,6 +96,56 @@ class EncoderTest(parameterized.TestCase):
     self.assertIs(encoders.shifted(frames, 0, np.random.default_rng(0)), frames)
 
 
+class PixelPairsTest(absltest.TestCase):
+  def setUp(self):
+    super().setUp()
+    lengths = {"a": (10, 20), "b": (5, 15)}
+    self.shown = {
+      task: fixtures.with_frames(fixtures.demonstrations(*of_task), 32)
+      for task, of_task in lengths.items()
+    }
+    self.shown["b"].frames[:] = 255 - self.shown["b"].frames  # other frames
+    self.encoder = _encoder()
+    self.pairs = PixelPairs(
+      self.shown, ("a", "b"), Standardiser(5 + 6), 0.5,
+      np.random.default_rng(0), self.encoder, 4, torch.float32,
+    )  # fmt: skip
+
+  def _check(self, inputs, task, rows):
+    data = self.shown[task]
+    frames = torch.from_numpy(data.frames[data.frame_rows()[rows]]).float()
+    expected = [torch.from_numpy(data.observation[rows]), self.encoder(frames)]
+    torch.testing.assert_close(inputs, torch.cat(expected, dim=1))
+
+  def test_a_row_has_the_features_of_its_own_frame(self):
+    batch = self.pairs.batch(torch.tensor([[0, 15, 29], [30, 36, 49]]))
+    self._check(batch.inputs[0], "a", [0, 15, 29])
+    self._check(batch.inputs[1], "b", [0, 6, 19])
+
+  def test_validation_is_of_all_its_rows_and_shifts_none(self):
+    self.enter_context(mock.patch.object(pixel_pairs, "_ROWS", 4))
+    (inputs,), (action,) = self.pairs.validation(1)
+    rows = self.pairs.validation_rows[1] - 30
+    self.assertLen(rows, 10)
+    self._check(inputs, "b", rows)
+    np.testing.assert_array_equal(action, self.shown["b"].action[rows])
+
+  def test_training_shifts_by_the_pixels_of_the_config(self):
+    config = bc.BcConfig(batch_size=8, encoder=EncoderConfig(shift=3))
+    sizes = 5, 2
+    agent = bc.build(
+      config, parts(("a",), self.shown, sizes=sizes, frame_shape=_SHAPE)
+    )
+    agent.begin_epoch()
+    with mock.patch.object(
+      encoders, "shifted", side_effect=encoders.shifted
+    ) as shifted:
+      agent.update()
+      agent.end_epoch()
+    (call,) = shifted.mock_calls  # of the batch, and none of validation
+    self.assertEqual(call.args[1], 3)
+
+
 class CloningTest(absltest.TestCase):
   def _loss(self, is_blind: bool) -> float:
     """After some epochs on pairs whose action is where the dot is."""
@@ -109,10 +164,9 @@ class CloningTest(absltest.TestCase):
       learning_rate=3e-3,
       encoder=EncoderConfig(channels=8, shift=0),
     )
-    shape = _SHAPE
+    sizes = 5, 2
     agent = bc.build(
-      config,
-      fixtures.parts(("t",), {"t": data}, sizes=(5, 2), frame_shape=shape),
+      config, parts(("t",), {"t": data}, sizes=sizes, frame_shape=_SHAPE)
     )
     for _ in range(60):
       for _ in range(agent.begin_epoch()):

@@ -1,6 +1,8 @@
 """The LfGP agent on synthetic data: learning, determinism, resuming."""
 
+import functools
 import math
+import operator
 from unittest import mock
 
 import numpy as np
@@ -90,6 +92,41 @@ class ContractTest(parameterized.TestCase):
     temperature = agent._scheduler.temperature
     self.assertAlmostEqual(temperature, 360 * 0.9995**4, places=6)
 
+  def test_actions_are_samples_of_the_intentions(self):
+    agent, row = make_agent(TASKS), np.zeros(OBS, np.float32)
+    agent.learner.networks.intentions.heads.set_std(0.5)
+    agent.begin_episode()
+    values = np.arctanh([agent.act(row) for _ in range(45)])  # of one period
+    self.assertBetween(values.std(0).mean(), 0.3, 0.7)
+
+  def test_an_episode_begins_with_a_period_of_its_own(self):
+    agent, rows = make_agent(**_PERIODS), np.zeros((7, OBS), np.float32)
+    for _ in range(2):  # a period, and two steps of the next one
+      fixtures.chosen(agent, rows)
+    self.assertLen(agent._scheduler._history, 2)
+    self.assertEqual(agent._choices.sum(), 4)
+
+  def test_choices_are_shares_since_the_last_metrics(self):
+    agent = make_agent(**{"scheduler.kind": "uniform", "scheduler.xi": 1})
+    for _ in range(2):
+      chosen = fixtures.chosen(agent, np.zeros((8, OBS), np.float32))
+      metrics = agent.metrics()
+      for index, task in enumerate(agent.tasks):
+        found = metrics[f"scheduler/{task}"]
+        self.assertEqual(found, chosen.count(index) / 8)
+
+  def test_metrics_are_means_over_the_updates_that_had_them(self):
+    agent, other = (make_agent(**{"reward.every": 2}) for _ in "ab")
+    made = [other.learner.update(other.batches.draw(n)) for n in range(3)]
+    found = fixtures.train(agent, 3)
+    for name, had in (("critic", made), ("discriminator", made[::2])):
+      expected = np.mean([one[f"loss/{name}"].item() for one in had])
+      self.assertAlmostEqual(found[f"loss/{name}"], expected, places=4)
+    last = fixtures.train(agent, 1)
+    expected = other.learner.update(other.batches.draw(3))["loss/critic"]
+    self.assertAlmostEqual(last["loss/critic"], expected.item(), places=4)
+    self.assertTrue(math.isnan(last["loss/discriminator"]))
+
   def test_scheduler_learns_the_main_tasks_discounted_return(self):
     periods = {"scheduler.phi": 1.0, "scheduler.xi": 10}
     agent = make_agent(**{"critic.discount": 0.5}, **periods)
@@ -131,6 +168,13 @@ class BatchTest(absltest.TestCase):
     for share, counts in ((0.0, [12, 10, 10]), (0.5, [16, 8, 8])):
       task = split(32, share)
       self.assertEqual(np.bincount(task).tolist(), counts)
+    share = {"reward.expert_share": 0.5, "reward.main_expert_share": 0.5}
+    batch = make_agent(**share).batches.draw(0).batch
+    for part, count in zip(
+      fixtures.demonstrations().values(), (8, 4, 4), strict=True
+    ):
+      found = fixtures.among(batch.inputs, part.observation)
+      self.assertEqual(sum(found), count)
 
   def test_intentions_may_leave_expert_rows_to_the_critics(self):
     share = {"reward.expert_share": 0.25}
@@ -165,6 +209,22 @@ class BatchTest(absltest.TestCase):
       drawn = [agent.batches.draw(0).expert.inputs[index] for _ in range(9)]
       self.assertTrue(all(fixtures.among(torch.cat(drawn), held)))
       self.assertLen(torch.cat(drawn).unique(dim=0), len(held))
+
+  def test_rows_of_success_do_not_reach_into_the_attempt_before(self):
+    shown = fixtures.demonstrations(attempt=2)
+    for part in shown.values():
+      part.is_last[1::4] = False  # every other attempt has no end
+    agent = make_agent(
+      shown=shown, **{"final_rows": 3, "reward.final_share": 1.0}
+    )
+    expert = agent.batches.draw(0).expert
+    for inputs, part in zip(expert.inputs, shown.values(), strict=True):
+      whole = part.observation[part.episode % 2 == 1]
+      self.assertTrue(all(fixtures.among(inputs, whole)))
+
+  def test_a_task_with_nothing_but_success_draws_from_it_throughout(self):
+    agent = make_agent(**{"final_rows": 20, "reward.final_share": 0.5})
+    self.assertLen(agent.batches.draw(0).expert.inputs[0], fixtures.B)
 
   def test_expert_share_puts_expert_rows_into_the_batch_and_decays(self):
     share = {"reward.expert_share": 0.25, "reward.expert_share_decay": 0.5}
@@ -241,8 +301,28 @@ class DeterminismTest(parameterized.TestCase):
     np.testing.assert_equal(first.metrics(), second.metrics())
     self.assertGreater(np.abs(actions - _live(other)).max(), 1e-3)
 
+  def test_each_source_of_random_numbers_follows_from_the_seed(self):
+    first, again, other = (
+      make_agent(seed=seed).state_dict() for seed in (3, 3, 4)
+    )
+    for path in (
+      ("acting",),
+      ("sampling",),
+      ("scheduler", "generator"),
+      ("learner", "generator"),
+      ("learner", "networks", "critics"),
+    ):
+      one, same, differs = (
+        functools.reduce(operator.getitem, path, state)
+        for state in (first, again, other)
+      )
+      np.testing.assert_equal(one, same)
+      with self.assertRaises(AssertionError, msg=path):
+        np.testing.assert_equal(one, differs)
+
   @parameterized.parameters(
     {},
+    {"bfloat16": True},
     {"optimiser.weight_decay": 0.01, "inputs.standardise": True},
     {"pretraining.updates": 3, "reward.expert_share": 0.1},
     {"prior.weight": 1.0, "prior.decay": 0.9},

@@ -155,3 +155,8 @@ class StandardiserTest(absltest.TestCase):
     expected = torch.tensor([[0.002, -1.0, 0.197375, -1.0]])
     torch.testing.assert_close(result, expected)
     self.assertEqual(standardiser.input_size, 4)
+    standardiser.fit(np.array([[0.0, -1.0], [4.0, -1.0]], np.float32))
+    result = standardiser(torch.tensor([[0.002, -1.0]]))
+    # (0.002 - 2) / 2; the tanh is of what is not standardised.
+    expected = torch.tensor([[-0.999, 0.0, 0.197375, -1.0]])
+    torch.testing.assert_close(result, expected)

@@ -76,6 +76,21 @@ class ActingTest(absltest.TestCase):
     mean = policy.act(row, deterministic=True)
     np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
 
+  def test_samples_spread_by_the_networks_std(self):
+    network, row = _network(), _observation()
+    many = NetworkPolicy(network, TASKS).act(
+      np.repeat(row[None], 4000, 0),
+      "first",
+      deterministic=False,
+      generator=np.random.default_rng(0),
+    )
+    inputs = network.standardiser(torch.from_numpy(row)[None])
+    with torch.no_grad():
+      std = network(inputs)[1][1, 0]
+    # Before the tanh; the float64 keeps digits near the ends.
+    found = np.arctanh(many.astype(np.float64)).std(0)
+    np.testing.assert_allclose(found, std, rtol=0.05)
+
   def test_a_networks_policy_acts_by_its_parameters_of_the_moment(self):
     network, row = _network(), _observation()
     policy = NetworkPolicy(network, TASKS)

@@ -10,7 +10,7 @@ from absl.testing import absltest, parameterized
 from lfgp_dmc import toy
 from lfgp_dmc.acting import collection
 from lfgp_dmc.acting.attempts import CollectionPlan
-from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents import optimisation, synthetic
 from lfgp_dmc.agents.lfgp.prior import entropies
 from lfgp_dmc.data import evaluation_csv
 from tests.agents import fixtures
@@ -58,6 +58,15 @@ class PretrainingTest(parameterized.TestCase):
     _, std = agent.learner.networks.intentions(torch.randn(7, OBS))
     torch.testing.assert_close(std, torch.full_like(std, 0.1))
 
+  def test_the_step_falls_to_0_by_a_half_cosine(self):
+    cloning = {"pretraining.updates": 3, "pretraining.learning_rate": 4e-3}
+    agent, rates = make_agent(**_OWN, **cloning), []
+    step = lambda adam, _: rates.append(adam.learning_rate)  # noqa: E731
+    with mock.patch.object(optimisation.Adam, "step", step):
+      agent.prepare()
+    # Shares 0.5 (1 + cos 0), 0.5 (1 + cos 60), 0.5 (1 + cos 120).
+    np.testing.assert_allclose(rates, [4e-3, 3e-3, 1e-3])
+
   def test_likelihood_learns_how_precise_the_expert_is(self):
     shown = fixtures.demonstrations()
     random = np.random.default_rng(0)
@@ -99,6 +108,19 @@ class PriorTest(parameterized.TestCase):
       self.assertIn("trunk.first.weight", state)  # a resume needs it
     self.assertLess(distances[1], 0.2 * distances[0])
 
+  @parameterized.product(
+    bfloat16=(False, True), distance=("squared_error", "divergence")
+  )
+  def test_the_first_update_is_at_no_distance(self, bfloat16, distance):
+    cloning = {"pretraining.updates": 3, "pretraining.std": 0.1}
+    prior = {**_PRIOR, "prior.distance": distance}
+    agent = make_agent(bfloat16=bfloat16, **_OWN, **prior, **cloning)
+    agent.prepare()
+    metrics = fixtures.train(agent, 1)
+    for task in TASKS:
+      found = metrics[f"distance_from_prior/{task}"]
+      self.assertAlmostEqual(found, 0.0, places=6)
+
   def test_the_weight_decays_and_counts_in_values(self):
     agent = make_agent(
       **{"prior.weight": 2.0, "prior.decay": 0.5, "prior.normalise": True}
@@ -106,13 +128,13 @@ class PriorTest(parameterized.TestCase):
     prior = agent.learner.prior
     inputs = torch.zeros(4, OBS)
     mean, std = torch.ones(2, len(TASKS), 4, A)
-    q = torch.full((2, len(TASKS), 4), -3.0)
+    q = torch.tensor([-3.0, -5.0])[:, None, None].expand(2, len(TASKS), 4)
     losses = []
     for updates in (0, 1, 2):
       prior.fade(updates)
       loss, found = prior(inputs, mean, std, q)
       losses.append(loss.item())
-    by_hand = 2.0 * 3.0 * found["distance_from_prior"].sum().item()
+    by_hand = 2.0 * 5.0 * found["distance_from_prior"].sum().item()
     expected = [by_hand, by_hand / 2, by_hand / 4]
     np.testing.assert_allclose(losses, expected, rtol=1e-5)
 

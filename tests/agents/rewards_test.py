@@ -56,7 +56,10 @@ class StoredRewardsTest(absltest.TestCase):
     self.assertAlmostEqual(reward.abs().max().item(), 0.05, places=6)
 
   def test_scheduler_learns_from_the_stored_main_reward(self):
-    agent = _stored(**{"critic.discount": 0.5, "scheduler.phi": 1.0})
+    as_stored = {"reward.clip": 5.0, "reward.scale": 0.1}  # not for it
+    agent = _stored(
+      **{"critic.discount": 0.5, "scheduler.phi": 1.0}, **as_stored
+    )
     rows = synthetic.transitions(20, OBS, A, seed=5)
     stored = np.zeros((20, len(STORED)), np.float32)
     stored[:, STORED.index("stack")] = np.arange(20)
@@ -130,6 +133,11 @@ class ExamplesTest(absltest.TestCase):
     ):
       make_agent(**_EXAMPLES, batch_size=4)
 
+  def test_the_share_of_examples_is_the_configs(self):
+    fields = {"batch_size": 64, "reward.share": 0.25}
+    task = make_agent(**_EXAMPLES, **fields).batches.draw(0).batch.example_task
+    self.assertEqual((task >= 0).tolist(), [False] * 48 + [True] * 16)
+
   def test_noise_is_in_the_tasks_own_stds(self):
     generator = np.random.default_rng(0)
     batch = with_examples(
@@ -181,7 +189,11 @@ class ExamplesTest(absltest.TestCase):
     for shift in (0.0, 100.0):
       agent = make_agent(  # without a trunk, tasks share nothing
         **_EXAMPLES,
-        **{"networks.layout": "separate", "optimiser.max_gradient_norm": 1e9},
+        **{
+          "critic.value_penalty": 10.0,
+          "networks.layout": "separate",
+          "optimiser.max_gradient_norm": 1e9,
+        },
       )
       draw = agent.batches.draw(0)
       others = (draw.batch.example_task > 0)[:, None]
@@ -216,8 +228,11 @@ class ExamplesTest(absltest.TestCase):
       rest = q[task][batch.example_task < 0].mean().item()
       self.assertGreater(own, rest + 0.1)
       self.assertAlmostEqual(metrics[f"value_low/{TASKS[task]}"], -10, places=4)
+      # The examples' own value bounds the rest; 10 is theirs alone.
+      self.assertLess(metrics[f"value_high/{TASKS[task]}"], 5)
 
   def test_need_rows_of_success(self):
     shown = fixtures.demonstrations(pairs=10, attempt=50)
-    with self.assertRaisesRegex(ValueError, r"is_last.*stack"):
-      make_agent(shown=shown, **_EXAMPLES)
+    for fields in (_EXAMPLES, {"reward.final_share": 0.5}):
+      with self.assertRaisesRegex(ValueError, r"is_last.*stack"):
+        make_agent(shown=shown, **fields)

@@ -40,8 +40,9 @@ def _table(tasks, generator, **fields):
   return QTable(tasks, generator, QTableConfig(**fields))
 
 
-def _make(name, tasks=STACK, seed=0):
-  config = fixtures.config(**{"scheduler.kind": name}).scheduler
+def _make(name, tasks=STACK, seed=0, **fields):
+  fields = {f"scheduler.{k}": v for k, v in fields.items()}
+  config = fixtures.config(**{"scheduler.kind": name, **fields}).scheduler
   return schedulers.make_scheduler(config, tasks, np.random.default_rng(seed))
 
 
@@ -93,6 +94,16 @@ class QTableTest(absltest.TestCase):
       seen.append(table.temperature)
     self.assertEqual(seen, [180, 100, 100])
 
+  def test_a_state_holds_values_and_temperature(self):
+    table = _table(2, _Scripted([0, 1]), phi=0.5, temperature=8, decay=0.5)
+    other = _table(2, np.random.default_rng(0))
+    table._generator.bit_generator = other._generator.bit_generator
+    self._play(table, [10.0, 20.0])
+    other.load_state_dict(fixtures.reloaded(table.state_dict()))
+    self.assertEqual(other.temperature, 2.0)
+    self.assertEqual([other.value([0]), other.value([0, 1])], [5.0, 10.0])
+    self.assertEqual(other.value([1]), 0.0)
+
   def test_returns_must_match_the_choices(self):
     table = _table(2, np.random.default_rng(0))
     table.begin_episode()
@@ -112,9 +123,12 @@ class ConditionalTest(parameterized.TestCase):
     ("stack", "reset", "lift", 1 / 6),
     ("stack", "stack", "open_gripper", 0.4),
     ("stack", "lift", "move_object", 0.25),
+    ("stack", "open_gripper", "lift", 1 / 6),
     ("bring", "reach", "close_gripper", 0.125),
     ("insert", "reset", "bring", 0.125),
     ("insert", "bring", "insert", 0.8),
+    ("insert", "insert", "open_gripper", 0.4),
+    ("insert", "insert", "reach", 0.05),
     ("insert", "lift", "reach", 0.0),
     ("insert", "reach", "close_gripper", 0.1),
     # The extra task's .35 dropped: .1 / .65.
@@ -169,6 +183,11 @@ class FactoryTest(parameterized.TestCase):
     scheduler.begin_episode()
     np.testing.assert_allclose(scheduler.probabilities(), expected)
 
+  @parameterized.parameters("weighted_random", "weighted_random_handcrafted")
+  def test_the_main_tasks_weight_is_the_configs(self, name):
+    found = _make(name, main_weight=0.75).probabilities()
+    np.testing.assert_allclose(found, [0.75, 0.05, 0.05, 0.05, 0.05, 0.05])
+
   def test_single_task_is_always_chosen(self):
     for name in ("q_table", "weighted_random", "main_only", "uniform"):
       scheduler = _make(name, ("a",))
@@ -178,6 +197,7 @@ class FactoryTest(parameterized.TestCase):
 
 class HandcraftedTest(parameterized.TestCase):
   @parameterized.parameters(
+    ("bring", 5, "bring open_gripper " * 4),
     ("stack", 5, "reach lift stack open_gripper reach lift stack open_gripper"),
     (
       "insert",
@@ -197,6 +217,24 @@ class HandcraftedTest(parameterized.TestCase):
     played = _play(_make("weighted_random_handcrafted"), 400)
     followed = sum(tuple(episode) in sequences for episode in played)
     self.assertAlmostEqual(followed / 400, 0.5, delta=0.1)
+
+  @parameterized.parameters((0.0, 0), (1.0, 50))
+  def test_the_share_of_sequences_is_the_configs(self, probability, expected):
+    sequences = handcrafted.sequences_for(STACK)
+    name = "weighted_random_handcrafted"
+    played = _play(_make(name, probability=probability), 50)
+    followed = sum(tuple(episode) in sequences for episode in played)
+    self.assertEqual(followed, expected)
+
+  @parameterized.parameters(5, 12)
+  def test_a_sequence_starts_with_the_episode_and_over_again(self, periods):
+    sequences = handcrafted.sequences_for(STACK)
+    wanted = {(one + one)[:periods] for one in sequences}
+    scheduler = _make("weighted_random_handcrafted", probability=1.0)
+    for _ in range(5):
+      scheduler.begin_episode()
+      chosen = tuple(scheduler.next_task() for _ in range(periods))
+      self.assertIn(chosen, wanted)
 
   def test_missing_task_is_named(self):
     with self.assertRaisesRegex(ValueError, "needs lift, move_object, reach"):

@@ -1,9 +1,11 @@
 """What a new agent takes over from another: exactly what it says."""
 
 import numpy as np
+import torch
 from absl.testing import parameterized
 
 from lfgp_dmc.agents import synthetic
+from lfgp_dmc.agents.networks.flat import in_products
 from tests.agents import fixtures
 from tests.agents.fixtures import OBS, A
 
@@ -91,11 +93,27 @@ class CarryOverTest(parameterized.TestCase):
     source = _trained(**{"inputs.standardise": True})
     agent = _agent(NEW, **{"inputs.standardise": True})
     agent.carry_over(_networks(source), OLD)
+    started, resumed = (
+      _agent(NEW, **_OWN, **{"inputs.standardise": True}) for _ in "ab"
+    )
+    started.start_from(source.policy)
+    resumed.load_state_dict(started.state_dict())
     mean = _networks(source)["intentions"]["standardiser.mean"]
     std = _networks(source)["intentions"]["standardiser.deviation"]
-    pool = agent._experts
-    expected = (pool._observation.numpy() - mean) / std
-    np.testing.assert_allclose(pool._inputs, expected, rtol=1e-5, atol=1e-5)
+    for pool in (agent._experts, started._experts, resumed._experts):
+      expected = (pool._observation.numpy() - mean) / std
+      np.testing.assert_allclose(pool._inputs, expected, rtol=1e-5, atol=1e-5)
+
+  def test_products_in_bfloat16_take_over_what_is_carried(self):
+    source = _trained()
+    carried, started = (_agent(NEW, bfloat16=True, **_OWN) for _ in "ab")
+    carried.carry_over(_networks(_trained(**_OWN)), OLD)
+    started.start_from(source.policy)
+    for agent in (carried, started):
+      for name, module in agent.learner.networks.modules().items():
+        for parameter in module.parameters():
+          copy = in_products(parameter, torch.bfloat16)
+          self.assertTrue(copy.equal(parameter.bfloat16()), name)
 
   def test_without_discriminator_on_either_side(self):
     stored = {"reward.kind": "stored"}
@@ -136,6 +154,12 @@ class InitFromTest(parameterized.TestCase):
     self.assertIsNot(networks.intentions.trunk, networks.critics.trunk)
     agent.prepare()
     agent.update()
+
+  def test_intentions_get_the_std_of_the_config(self):
+    agent = _agent(NEW, **_OWN, **{"pretraining.std": 0.1})
+    agent.start_from(_trained(**_OWN).policy)
+    _, std = agent.learner.networks.intentions(torch.randn(7, OBS))
+    torch.testing.assert_close(std, torch.full_like(std, 0.1))
 
   def test_a_prior_that_is_random_for_new_tasks_is_refused(self):
     policy, own = _agent(("reach", "bring"), 1, **_OWN).policy, _OWN

@@ -69,6 +69,11 @@ class BoundsTest(absltest.TestCase):
 
 
 class AgentTest(absltest.TestCase):
+  def test_the_window_is_the_configs(self):
+    agent = fixtures.make_agent(**{"critic.value_penalty_window": 7})
+    rows = agent.learner.critics.bounds.state_dict()["rows"]
+    self.assertEqual(rows.shape, (7, 2, len(fixtures.TASKS)))
+
   def test_holds_values_between_the_bounds_and_logs_them(self):
     """The target's entropy term alone drives values out of the bounds."""
     means = {}
