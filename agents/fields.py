@@ -135,4 +135,5 @@ class OptimiserConfig:
   """What gradient steps have in common."""
 
   weight_decay: NonNegative = 0.0  # above 0: AdamW
-  max_gradient_norm: NonNegative = 10.0  # 0: none
+  # Of each part; 0: none. Discriminators have none, as in the released code.
+  max_gradient_norm: NonNegative = 10.0

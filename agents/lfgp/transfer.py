@@ -30,6 +30,7 @@ def carry_networks(
   names = (tasks, source_tasks)
   carry(networks.intentions, source["intentions"], *names, "intentions")
   carry(networks.critics, source["critics"], *names, "critics")
+  networks.critics.forget_hidden()
   name = "discriminator"
   if networks.discriminator is not None and name in source:
     # A main task's own discriminator stays with its task.

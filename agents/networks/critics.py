@@ -1,5 +1,7 @@
 """The twin critics: a trunk and two Q heads a task, stacked in one tensor."""
 
+from collections.abc import Iterator
+
 import torch
 from torch import nn
 from torch.nn import functional
@@ -103,6 +105,18 @@ class CriticNetwork(FlatModule):
 
   def reveal(self) -> None:
     """From now on, no input but the masked ones is hidden."""
-    for module in self.modules():
-      if isinstance(module, Selection):
-        module.reveal()
+    for selection in self._selections():
+      selection.reveal()
+
+  @torch.no_grad()
+  def forget_hidden(self) -> None:
+    """Sets weights of inputs that are still hidden to 0 (separate layout).
+
+    So no value jumps when they are revealed.
+    """
+    for selection in self._selections():
+      if selection.reveals:
+        self.heads.feature_weight.mul_(selection.shown[:, None])
+
+  def _selections(self) -> Iterator[Selection]:
+    return (m for m in self.modules() if isinstance(m, Selection))

@@ -62,10 +62,9 @@ def make_critics(
   heads = TwinCriticHeads(
     tasks, features, hidden, actions, generator, layer_norm, layers
   )
-  if selection.reveals:
-    with torch.no_grad():
-      heads.feature_weight.mul_(selection.shown[:, None])
-  return CriticNetwork(trunk, heads)
+  critics = CriticNetwork(trunk, heads)
+  critics.forget_hidden()
+  return critics
 
 
 def _make_trunk(

@@ -93,6 +93,7 @@ class LfgpConfigTest(parameterized.TestCase):
     ("reward.share is 1.0", {"reward.kind": "examples", "reward.share": 1.0}),
     ("expert_share", {"reward.kind": "stored", "reward.expert_share": 0.1}),
     ("phi", {"scheduler.phi": 0.5}),
+    ("final_share is 0.01; valid: 0, or", {"reward.final_share": 0.01}),
     (
       "expert_share is 1.0; valid: one that leaves rows",
       {"reward.expert_share": 1.0, "reward.intentions_on_experts": False},

@@ -115,6 +115,22 @@ class CarryOverTest(parameterized.TestCase):
           copy = in_products(parameter, torch.bfloat16)
           self.assertTrue(copy.equal(parameter.bfloat16()), name)
 
+  def test_floats_that_are_hidden_again_are_revealed_without_a_jump(self):
+    fields = {
+      "networks.layout": "separate",
+      "critic.revealed": "0:2",
+      "critic.revealed_after": 2,
+      "critic.learning_rate": 0.01,
+    }
+    source = fixtures.make_agent(seed=1, **fields)
+    fixtures.train(source, 10)
+    agent = fixtures.make_agent(seed=2, **fields)
+    agent.carry_over(_networks(source), source.tasks)
+    inputs, critics = torch.randn(3, OBS), agent.learner.networks.critics
+    before = critics(inputs, torch.zeros(3, A))
+    critics.reveal()
+    torch.testing.assert_close(critics(inputs, torch.zeros(3, A)), before)
+
   def test_without_discriminator_on_either_side(self):
     stored = {"reward.kind": "stored"}
     source = _trained(NEW, **stored)
