@@ -203,8 +203,8 @@ class LfgpConfig:
         )
       if reward.final_share and int(reward.final_share * reward.batch_size) < 1:
         yield (
-          f"reward.final_share is {reward.final_share!r}; valid: 0, or one that "
-          f"is a row of reward.batch_size, {reward.batch_size}"
+          f"reward.final_share is {reward.final_share!r}; valid: 0, or what "
+          f"makes a row of reward.batch_size, {reward.batch_size}"
         )
     elif isinstance(reward, ExampleReward):
       if self.scheduler.kind == "q_table":
