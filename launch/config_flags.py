@@ -33,7 +33,10 @@ def define(
     if name.startswith("agent.") and name.endswith(configs.KIND)
   }
   main_task = _last(arguments, "config.main_task", "")
-  defaults = configs.make_config(algorithm, preset, main_task, kinds)
+  environment = _last(arguments, "config.environment", "")
+  defaults = configs.make_config(
+    algorithm, preset, main_task, kinds, environment
+  )
   known = dict(configs.flattened(defaults.to_dict()))
   for argument, name in zip(arguments, names, strict=True):
     if _name(argument) == f"config.{name}" and name not in known:

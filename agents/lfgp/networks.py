@@ -122,7 +122,10 @@ def inputs_of(slices: str, standardiser: Standardiser) -> list[int]:
   size = len(standardiser.mean)
   chosen = fields.positions(slices)
   if chosen and max(chosen) >= size:
-    raise ValueError(f"slices are {slices}; the observation has {size} floats")
+    raise ValueError(
+      f"slices (critic.masked, critic.revealed, reward.masked or "
+      f"reward.main_masked) are {slices}; the observation has {size} floats"
+    )
   scales = standardiser.input_size // size
   return [scale * size + at for scale in range(scales) for at in chosen]
 

@@ -46,7 +46,7 @@ def sequences_for(tasks: Sequence[str]) -> list[tuple[int, ...]]:
   if missing:
     raise ValueError(
       f"the handcrafted scheduler needs {', '.join(missing)} among the tasks; "
-      f"got {', '.join(tasks)}"
+      f"got {', '.join(tasks)}; others have scheduler.kind weighted_random"
     )
   names[MAIN] = 0
   return [tuple(names[name] for name in sequence) for sequence in chosen]

@@ -210,6 +210,19 @@ PRESETS: dict[str, dict[str, Any]] = {
   "pixels": _PIXELS,
 }
 
+# What they know of our blocks: symmetries, which of the 59 floats to hide, and
+# sequences of tasks. With another environment these are left out.
+OF_BLOCKS = (
+  "mirror_demonstrations",
+  "shifted_copies",
+  "agent.critic.masked",
+  "agent.critic.revealed",
+  "agent.critic.revealed_after",
+  "agent.reward.masked",
+  "agent.reward.main_masked",
+)
+HANDCRAFTED = "weighted_random_handcrafted"  # else: weighted_random
+
 # What a main task changes of a preset: half a millimetre decides Insert.
 OF_TASK: dict[tuple[str, str], dict[str, Any]] = {
   ("vpace", "insert"): {

@@ -12,7 +12,12 @@ from lfgp_dmc.agents import fields
 from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.launch.configs.algorithms import ALGORITHMS
-from lfgp_dmc.launch.configs.presets import OF_TASK, PRESETS
+from lfgp_dmc.launch.configs.presets import (
+  HANDCRAFTED,
+  OF_BLOCKS,
+  OF_TASK,
+  PRESETS,
+)
 from lfgp_dmc.launch.configs.run_config import RunConfig
 from lfgp_dmc.runs.pytree import flattened
 
@@ -34,6 +39,7 @@ def make_config(
   preset: str = "paper",
   main_task: str = "stack",
   kinds: Mapping[str, str] | None = None,
+  environment: str = "",
 ) -> ml_collections.ConfigDict:
   """All fields of a run with their defaults, locked.
 
@@ -43,6 +49,7 @@ def make_config(
     main_task: as above.
     kinds: such as {"agent.scheduler.kind": "uniform"}; they decide the fields
       of their groups.
+    environment: if there is one, what presets know of our blocks is left out.
 
   Raises:
     ValueError: an unknown name; the message lists the valid ones.
@@ -55,6 +62,8 @@ def make_config(
       raise ValueError(f"unknown {what} {name!r}; valid: {', '.join(valid)}")
   chosen = ALGORITHMS[algorithm]
   of_preset = {**PRESETS[preset], **OF_TASK.get((preset, main_task), {})}
+  if environment:
+    of_preset = _without_blocks(of_preset)
   applying = {
     name: value
     for name, value in of_preset.items()
@@ -144,6 +153,16 @@ def hint(name: str, known: Iterable[str], prefix: str = "config.") -> str:
   if not close:
     return "see --help"
   return f"did you mean {' or '.join(prefix + other for other in close)}?"
+
+
+def _without_blocks(of_preset: Mapping[str, Any]) -> dict[str, Any]:
+  """A preset for environments of which it knows nothing."""
+  kept = {k: v for k, v in of_preset.items() if k not in OF_BLOCKS}
+  kind = "agent.scheduler.kind"
+  return {
+    k: "weighted_random" if (k, v) == (kind, HANDCRAFTED) else v
+    for k, v in kept.items()
+  }
 
 
 def _layered(*layers: Mapping[str, Any]) -> dict[str, Any]:

@@ -105,7 +105,10 @@ def prepare(environment: dm_env.Environment, look: Look) -> None:
   """
   physics = getattr(environment, "physics", None)
   if physics is None:
-    raise ValueError("this environment has no physics to render")
+    raise ValueError(
+      "this environment cannot be drawn: it has no attribute `physics`, such "
+      "as a dm_control environment's (docs/own_task.md)"
+    )
   model = physics.model
   cameras = [model.id2name(i, "camera") for i in range(model.ncam)]
   if look.camera not in cameras:

@@ -94,19 +94,20 @@ class OwnTaskTest(fixtures.FolderTest):
       ["point_mass.py", "point.flags", "demonstrate.py"],
       _write_files(self.folder),
     )
-    *_, demonstrate, check, lfgp = pages.commands(_PAGE)
+    *_, demonstrate, check, lfgp, few = pages.commands(_PAGE)
     script = str(self.folder / demonstrate.removeprefix("python "))
     short = (
       "--config.env_steps=150 --config.warm_up=60 --config.random_steps=60"
       " --config.agent.networks.hidden_size=16 --config.evaluation_episodes=2"
     )
     outputs = []
-    for line in (script, check, f"{lfgp} {short}"):
+    for line in (script, check, f"{lfgp} {short}", f"{few} {short}"):
       done = call(line.replace("launch/flags", str(_FLAGS)), self.folder)
       self.assertEqual(done.returncode, 0, done.stderr)
       outputs.append(done.stdout)
     self.assertIn("control rate: 10 Hz", outputs[1])
-    self.assertRegex(outputs[2], r"(?s)right .*left ")
+    for output in outputs[2:]:
+      self.assertRegex(output, r"(?s)right .*left ")
     policy = lfgp_dmc.load_policy(self.folder / "runs/point_lfgp", "left")
     self.assertIsNotNone(policy)
 

@@ -1,5 +1,6 @@
 """Configs: defaults, presets, flagfiles, and what is refused."""
 
+import itertools
 import json
 import pathlib
 
@@ -104,6 +105,22 @@ class ConfigTest(parameterized.TestCase):
                      (0.5, 45))  # fmt: skip
     with self.assertRaisesRegex(ValueError, "unknown --config.agent.sched"):
       config_of("--config.agent.scheduler.main_weight=0.5")
+
+  @parameterized.parameters(
+    itertools.product(("ral", "vpace", "fast", "fast_precise", "few"),
+                      ("stack", "insert"))
+  )  # fmt: skip
+  def test_another_environment_has_nothing_of_our_blocks(self, preset, task):
+    config = config_of(f"--preset={preset}", f"--config.main_task={task}",
+                       "--config.environment=a:b")  # fmt: skip
+    critic, reward = config.agent.critic, config.agent.reward
+    slices = critic.masked, critic.revealed, getattr(reward, "masked", "")
+    self.assertEqual((*slices, getattr(reward, "main_masked", "")), ("",) * 4)
+    self.assertEqual(config.agent.scheduler.kind, "weighted_random")
+    symmetries = config.mirror_demonstrations, config.shifted_copies
+    self.assertEqual(symmetries, (False, 0))
+    ours = config_of(f"--preset={preset}", f"--config.main_task={task}")
+    self.assertEqual(config.agent.batch_size, ours.agent.batch_size)
 
   def test_insert_is_more_precise(self):
     bring, insert = (
