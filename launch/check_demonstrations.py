@@ -38,6 +38,7 @@ _CAMERA = flags.DEFINE_integer(
 _STRIP = flags.DEFINE_string("strip", "", "A .png for the film strips.")
 
 _COLUMNS = 6
+_SHOWN = 5  # names in a message
 _LOOK = recorder.Look(height=240, width=320)
 
 
@@ -70,6 +71,12 @@ def _read(
   shape = environments.frame_shape(environment)
   folder = pathlib.Path(_DATASET.value)
   paths = files.own(folder, demonstrations.SUFFIX)
+  if folder.is_dir() and not (paths or asked):
+    there = ", ".join(sorted(path.name for path in folder.iterdir())[:_SHOWN])
+    raise ValueError(
+      f"no {demonstrations.SUFFIX} file in {folder}; it holds: "
+      f"{there or 'nothing'}"
+    )
   tasks = asked or [path.stem for path in paths] or ["TASK"]
   found = demonstrations.read_folder(folder, tasks, *widths, shape)
   print(demonstration_summary.table(found))
@@ -81,6 +88,11 @@ def _read(
   for task, data in found.items():
     for doubt in demonstration_summary.doubts(data):
       print(f"look again: {task}: {doubt}")
+    if not _ENVIRONMENT.value and task not in lfgp_dmc.ALL_TASKS:
+      print(
+        f"look again: {task} is none of the block tasks; of your own "
+        "environment, give --environment"
+      )
   if len(rates) > 1:
     raise ValueError(f"{folder} has several control rates")
   return found

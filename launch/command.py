@@ -4,6 +4,7 @@ import contextlib
 import io
 import logging
 import os
+import pathlib
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -69,10 +70,19 @@ def run(
         define_flags(arguments)
       return flags.FLAGS([argv[0], *arguments])
     except (flags.Error, ValueError) as error:
-      sys.exit(_fail(str(error)))
+      sys.exit(_fail(_with_flagfiles(str(error).removeprefix("ERROR:: "))))
 
   with _quiet_after_a_closed_pipe():
     app.run(guarded_main, flags_parser=parse)
+
+
+def _with_flagfiles(message: str) -> str:
+  """Says where ours lie after what says that a flagfile is missing."""
+  if "open flagfile" not in message:
+    return message
+  folder = pathlib.Path(__file__).with_name("flags")
+  names = ", ".join(sorted(path.name for path in folder.glob("*.flags")))
+  return f"{message}; in {folder}: {names}"
 
 
 def _readable(arguments: Sequence[str]) -> list[str]:

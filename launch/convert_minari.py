@@ -13,6 +13,7 @@ files need: --attributes=task=stack,expert=human,...
 import dataclasses
 import functools
 import pathlib
+import warnings
 
 from absl import flags
 
@@ -40,6 +41,7 @@ def main() -> None:
     from lfgp_dmc.data import minari_datasets
   except ImportError as error:
     raise UserError(f"{error}; pip install 'lfgp-dmc[minari]'") from None
+  warnings.filterwarnings("ignore", category=UserWarning, module="minari")
   folder, prefix = pathlib.Path(_DATASET.value), f"{_MINARI.value.rstrip('/')}/"
   with command.checked_input():
     if not _BACK.value:

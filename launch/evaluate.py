@@ -8,6 +8,8 @@ Every intention plays whole episodes in the main task's environment, by its
 mean action; the reset of episode i depends on (--seed, i) alone. With
 --checkpoints the run's last ones play instead of its policy, each on resets of
 its own, from --seed on: their mean is an end that no checkpoint was chosen for.
+Episodes go to the run's evaluation.csv, or to that of --output; without it,
+those of a policy folder are only printed.
 """
 
 import functools
@@ -21,6 +23,7 @@ from lfgp_dmc.data import evaluation_csv, files
 from lfgp_dmc.launch import command, policies
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.task_names import CONTROL_RATES
 
 _NAME = run_folder.EVALUATION_NAME
@@ -131,7 +134,9 @@ def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
 def _output() -> pathlib.Path | None:
   """The file the rows go to; None: only the table is printed."""
   if not _OUTPUT.value:
-    return pathlib.Path(_RUN.value) / _NAME if _RUN.value else None
+    # Whoever evaluates a stored policy again does not change its folder.
+    run = RunFolder(pathlib.Path(_RUN.value))
+    return run.evaluation if _RUN.value and run.is_run else None
   path = pathlib.Path(_OUTPUT.value) / _NAME
   if path.exists():
     raise UserError(f"{path} exists; choose another --output")

@@ -50,7 +50,7 @@ __all__ = [
 def load(
   task: str, seed: int | None = None, **options: Any
 ) -> dm_env.Environment:
-  """Builds the environment of one of the nine tasks.
+  """Builds the environment of a task.
 
   Args:
     task: a name in `ALL_TASKS`.
@@ -102,7 +102,13 @@ class StoredPolicy:
     Raises:
       ValueError: there is no such intention (the message lists them), or
         observations have another width.
+      TypeError: it is no array, such as the whole timestep.
     """
+    if isinstance(observation, Mapping | dm_env.TimeStep):
+      raise TypeError(
+        f"observation is a {type(observation).__name__}; valid: what "
+        "lfgp_dmc.flatten makes of timestep.observation"
+      )
     return self._policy.act(observation, intention or self.intention)
 
 

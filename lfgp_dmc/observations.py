@@ -99,7 +99,9 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
 
   Raises:
     KeyError: a component is missing.
+    TypeError: it is another thing, such as the whole timestep.
   """
+  _check(observation)
   if not has_state(observation) and any(map(is_frame, observation)):
     return flatten_vision(observation)
   try:
@@ -110,6 +112,14 @@ def flatten(observation: Mapping[str, np.ndarray]) -> np.ndarray:
       f"{', '.join(OBSERVATION_SLICES)} (observations='features')"
     ) from None
   return np.concatenate(parts, dtype=np.float32)[_FLAT]
+
+
+def _check(observation: Any) -> None:
+  if not isinstance(observation, Mapping):
+    raise TypeError(
+      f"observation is a {type(observation).__name__}; valid: the named "
+      "observables, timestep.observation"
+    )
 
 
 def has_state(observation: Mapping[str, Any]) -> bool:
@@ -140,6 +150,7 @@ def conditions(observation: Mapping[str, np.ndarray]) -> dict[str, bool]:
 
 
 def _flags(observation, prefix: str) -> dict[str, bool]:
+  _check(observation)
   return {
     key.removeprefix(prefix): bool(value)
     for key, value in observation.items()

@@ -13,6 +13,7 @@ _LINE = (
   "{desc}: {n_fmt} of {total_fmt} {unit}s, {rate_fmt}, {remaining} left"
   "{postfix}"
 )
+_ENDLESS = "{desc}: {n_fmt} {unit}s, {rate_fmt}, {elapsed} so far{postfix}"
 
 
 class _Lines(tqdm.tqdm):
@@ -35,5 +36,7 @@ def bar(
   """A bar of tqdm on standard error; `options` are tqdm's."""
   if sys.stderr.isatty():
     return tqdm.tqdm(iterable, disable=not show, **options)
-  options |= {"mininterval": _EVERY, "delay": _EVERY, "bar_format": _LINE}
+  is_endless = iterable is None and options.get("total") is None
+  line = _ENDLESS if is_endless else _LINE
+  options |= {"mininterval": _EVERY, "delay": _EVERY, "bar_format": line}
   return _Lines(iterable, disable=not show, **options | {"leave": False})

@@ -101,8 +101,8 @@ def _handle(number: int, frame: Any) -> None:
     raise KeyboardInterrupt
   _current.is_made = True
   logging.warning(
-    "%s: stopping at the next good moment; once more, after %.0f seconds, to "
-    "stop now",
+    "%s: stopping at the end of an episode or epoch; once more, after %.0f "
+    "seconds, to stop now",
     signal.Signals(number).name,
     _REPEAT,
   )

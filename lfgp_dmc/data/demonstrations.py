@@ -112,7 +112,7 @@ def from_attempts(
     attributes: see `write`.
 
   Raises:
-    DatasetError: there is no attempt.
+    DatasetError: there is no attempt, or their widths differ.
   """
   parts = []
   for number, (states, actions, succeeded) in enumerate(attempts):
@@ -123,6 +123,13 @@ def from_attempts(
     )
   if not parts:
     raise DatasetError("there is no attempt")
+  shapes = [tuple(np.shape(rows)[1:] for rows in part[:2]) for part in parts]
+  for number, shape in enumerate(shapes):
+    if shape != shapes[0]:
+      raise DatasetError(
+        f"attempt {number} has states and actions of {shape}, the first of "
+        f"{shapes[0]}"
+      )
   arrays = {
     name: np.concatenate(part).astype(dtype)
     for (name, dtype), part in zip(
@@ -254,6 +261,8 @@ def read_folder(
     DatasetError: one line a faulty file, damaged files before missing ones.
   """
   folder = pathlib.Path(folder)
+  if folder.is_file():
+    raise DatasetError(f"{folder} is a file; valid: the folder that it is in")
   if not folder.is_dir():
     raise DatasetError(
       f"no dataset folder {folder}; it needs: "

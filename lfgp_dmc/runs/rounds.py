@@ -26,7 +26,8 @@ class Rounds(abc.ABC, Generic[_Agent]):
   due, so that the resumed run equals one never stopped.
   """
 
-  _unit = "step"  # of the progress bar
+  _unit, _label = "step", "training"  # of the progress bar
+  _has_known_end = True
 
   def __init__(
     self,
@@ -63,9 +64,9 @@ class Rounds(abc.ABC, Generic[_Agent]):
     progress.is_complete |= progress.env_step >= schedule.env_steps
     progress.evaluation_due |= schedule.evaluate_first and not progress.env_step
     self._bar = progress_bars.bar(
-      total=schedule.env_steps,
+      total=schedule.env_steps if self._has_known_end else None,
       initial=progress.env_step,
-      desc="training",
+      desc=self._label,
       unit=self._unit,
       show=schedule.progress_bar,
       mininterval=1.0,

@@ -120,6 +120,7 @@ def resume(
   """
   path = pathlib.Path(path)
   known = complete(settings(read_config(path)))
+  run = RunFolder(path, _locked(path))
   fields = _differing_fields(known, settings(config))
   if fields:
     shown = fields[:_SHOWN]
@@ -129,7 +130,7 @@ def resume(
       f"{path} was started with another config; --resume keeps it. Differing: "
       + "; ".join(shown)
     )
-  return RunFolder(path, _locked(path))
+  return run
 
 
 def settings(config: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,8 @@ from lfgp_dmc.types import Metrics, SupervisedAgent
 class EpochRounds(Rounds[SupervisedAgent]):
   """Trains until the agent converges, at most `schedule.env_steps` updates."""
 
-  _unit = "update"
+  _unit, _label = "update", "training until validation stops improving"
+  _has_known_end = False
 
   def _round(self) -> None:
     """Makes the updates of one epoch, or those that the run has left.

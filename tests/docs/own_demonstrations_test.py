@@ -118,7 +118,7 @@ class OwnDemonstrationsTest(fixtures.FolderTest):
     reach = demonstrations.read(self.folder / "data/mine/reach.hdf5")
     demonstrations.write(path, reach, attributes)
     for line, message in (
-      ("--dataset=empty", "empty/TASK.hdf5: missing"),
+      ("--dataset=empty", "no .hdf5 file in empty; it holds: nothing"),
       ("--dataset=empty --task=lift", "lift.hdf5: missing"),
       (
         "--dataset=data/mine --environment=lfgp_dmc.toy:PointEnvironment "

@@ -14,7 +14,9 @@ _POLICIES = pathlib.Path(__file__).parents[2] / "results" / "policies"
 # Script, arguments, what the message says.
 _BAD = (
   ("train.py --config.agent.sheduler.xi=5", "did you mean --config.agent."),
-  ("train.py --flagfile=no.flags", "no.flags"),
+  ("train.py --flagfile=no.flags", "error: Unable to open flagfile"),
+  ("train.py --flagfile=no.flags", "no.flags'; in "),
+  ("train.py --flagfile=no.flags", "lfgp_few.flags"),
   ("train.py --config.seed=many", "flag --config.seed=many"),
   ("train.py --config.threads=9999999", "config.threads is 9999999; valid:"),
   ("train.py --resume", "--resume needs --run"),
@@ -78,6 +80,8 @@ _BAD = (
   ),
   ("check_demonstrations.py", "--dataset is not set"),
   ("check_demonstrations.py --dataset=no", "no dataset folder no"),
+  ("check_demonstrations.py --dataset=.", "no .hdf5 file in .; it holds: a_fi"),
+  ("check_demonstrations.py --dataset=a_file", "a_file is a file; valid: the"),
   ("check_demonstrations.py --dataset=no --strip=a.gif", "valid: a new .png"),
   (
     "check_demonstrations.py --dataset=no --environment=no:thing",

@@ -2,6 +2,7 @@
 
 import json
 import pathlib
+import shutil
 import subprocess
 
 import numpy as np
@@ -92,6 +93,15 @@ class BlockRunTest(absltest.TestCase):
     done = self._call(line)
     self.assertEqual(done.returncode, 1)
     self.assertIn("exists; choose another --output", done.stderr)
+
+  def test_evaluating_a_policy_folder_leaves_it_as_it_is(self):
+    stored = self.folder / "stored"
+    stored.mkdir()
+    for name in ("config.json", "policy.safetensors"):
+      shutil.copy(self.path / name, stored)
+    done = self._call("evaluate.py --run=stored --episodes=1 --workers=1")
+    self.assertRegex(done.stdout, r"bring .*\n\Z")
+    self.assertLen(list(stored.iterdir()), 2)
 
   def test_evaluates_the_last_checkpoints_each_on_its_own_resets(self):
     line = "evaluate.py --run=runs/tiny --episodes=1 --workers=1 --seed=3 "

@@ -2,6 +2,7 @@
 
 from unittest import mock
 
+import dm_env
 import numpy as np
 from absl.testing import absltest, parameterized
 
@@ -101,6 +102,16 @@ class FacadeTest(parameterized.TestCase):
     }
     self.assertEqual(lfgp_dmc.successes(observation), {"stack": True})
     self.assertEqual(lfgp_dmc.conditions(observation), {"stack": False})
+
+  def test_a_whole_timestep_is_refused(self):
+    timestep = dm_env.restart({"ee_position": np.zeros(3)})
+    for read in (lfgp_dmc.flatten, lfgp_dmc.successes, lfgp_dmc.conditions):
+      with self.assertRaisesRegex(TypeError, "is a TimeStep; valid: the named"):
+        read(timestep)
+    policy = lfgp_dmc.StoredPolicy(_Policy(), "stack", {})
+    for seen in (timestep, timestep.observation):
+      with self.assertRaisesRegex(TypeError, "valid: what lfgp_dmc.flatten"):
+        policy(seen)
 
   @parameterized.parameters(*lfgp_dmc.ALL_TASKS)
   def test_a_task_set_starts_with_its_main_task(self, task):

@@ -23,7 +23,7 @@ class ProgressBarsTest(absltest.TestCase):
       mock.patch.object(progress_bars._Lines, "_printed", 0.0),
       mock.patch("tqdm.std.time", clock),
       progress_bars.bar(
-        total=200, desc="training", unit="step", **options
+        **{"total": 200, "desc": "training", "unit": "step"} | options
       ) as outer,
       progress_bars.bar(total=200, desc="inner", unit="update") as inner,
     ):
@@ -43,6 +43,10 @@ class ProgressBarsTest(absltest.TestCase):
     )
     self.assertNotIn("\r", "".join(lines))
     self.assertEmpty(self._play(io.StringIO(), 0.1))
+    endless = self._play(io.StringIO(), 1.0, total=None).split("\n")
+    self.assertEqual(
+      endless[-2], "training: 179 steps,  1.00step/s, 03:00 so far, right=179"
+    )
     hidden = self._play(io.StringIO(), 9.0, show=False)
     self.assertNotIn("training", hidden)
 

@@ -73,6 +73,18 @@ class DemonstrationsTest(fixtures.FolderTest):
     )
     self.assertLen(read.head(4), 4)
 
+  def test_attempts_of_other_widths_are_named(self):
+    attempts = [
+      (np.zeros((3, width)), np.zeros((2, 2)), np.array([False, True]))
+      for width in (4, 4, 5)
+    ]
+    with self.assertRaisesRegex(
+      demonstrations.DatasetError,
+      r"attempt 2 has states and actions of \(\(5,\), \(2,\)\), the first of",
+    ):
+      demonstrations.from_attempts(attempts)
+    self.assertLen(demonstrations.from_attempts(attempts[:2]), 4)
+
   def test_the_first_whole_attempts(self):
     self.assertEqual(_DATA.attempts, 1)  # the second is cut
     for wanted in (1, 2):

@@ -123,15 +123,17 @@ class RunFolderTest(fixtures.FolderTest):
     with self.assertRaisesRegex(ValueError, "--resume"):
       run_folder.create(run.path, config)
     with self.assertRaisesRegex(ValueError, "another process"):
-      run_folder.resume(run.path, config)
+      run_folder.resume(run.path, {"seed": 1})  # whatever else is wrong
     path = run.path
     del run
     self.assertEqual(run_folder.resume(path, config).path, path)
 
   def test_a_changed_config_is_refused_by_field(self):
     run = run_folder.create(self.folder / "a", {"seed": 0, "agent": {"xi": 45}})
+    path = run.path
+    del run
     with self.assertRaises(ValueError) as caught:
-      run_folder.resume(run.path, {"seed": 0, "agent": {"xi": 9, "new": True}})
+      run_folder.resume(path, {"seed": 0, "agent": {"xi": 9, "new": True}})
     self.assertIn("agent.xi (45, now 9)", str(caught.exception))
     self.assertIn("agent.new (unset, now true)", str(caught.exception))
     self.assertNotIn("seed", str(caught.exception))
