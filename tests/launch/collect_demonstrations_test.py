@@ -1,13 +1,19 @@
 """The collection command: what it writes, refuses, and leaves behind."""
 
+import functools
 import os
 import pathlib
 
 import numpy as np
+from absl.testing import parameterized
 
+import lfgp_dmc
+from lfgp_dmc.acting import collection
+from lfgp_dmc.acting.attempts import CollectionPlan
 from lfgp_dmc.agents.policy import Policy
 from lfgp_dmc.data import demonstrations
 from lfgp_dmc.launch import command
+from lfgp_dmc.tasks import experts
 from tests import fixtures as shared
 from tests.launch import fixtures
 
@@ -54,6 +60,31 @@ class CollectDemonstrationsTest(shared.FolderTest):
   def test_whole_attempts_can_be_counted_instead(self):
     self._call("--task=reach --attempts_per_task=2 --output=data")
     self.assertEqual(self._read("data", "reach").attempts, 2)
+
+  @parameterized.parameters(("reset", {"keep_longest_of": 2}), ("play", {}))
+  def test_collects_what_the_flags_plan(self, kind, options):
+    given = [f"--{name}={value}" for name, value in options.items()]
+    given += ["--seed=4", "--control_hz=5", "--workers=1"]
+    self._call(
+      f"--task=reach --attempts_per_task=2 --collection={kind} --output=data "
+      f"{' '.join(given)}"
+    )
+    found = self._read("data", "reach")
+    self.assertEqual(found.attributes["collection"], kind)
+    plan = CollectionPlan(
+      functools.partial(lfgp_dmc.load, control_hz=5),
+      functools.partial(experts.ScriptedExpert, control_hz=5),
+      "reach",
+      ("reach",),
+      seed=4,
+      control_hz=5,
+      **options,
+    )
+    expected = collection.collect(
+      plan, kind, ("reach",), 1, attempts=2, progress=False
+    )["reach"].demonstrations
+    for name, array in expected.arrays().items():
+      np.testing.assert_array_equal(found.arrays()[name], array, name)
 
   def test_a_policy_demonstrates_with_sampled_actions(self):
     policy = _ROOT / "results" / "policies" / "stack"

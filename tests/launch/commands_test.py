@@ -133,6 +133,16 @@ class BlockRunTest(absltest.TestCase):
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertRegex(done.stdout, r"reach +100.0% +2")
 
+  def test_adds_to_the_runs_own_rows_those_it_does_not_have(self):
+    path = self.path / "evaluation.csv"
+    before = evaluation_csv.read_csv(path)
+    for _ in range(2):
+      done = self._call("evaluate.py --run=runs/tiny --workers=1 --episodes=2")
+      self.assertEqual(done.returncode, 0, done.stderr)
+      rows = evaluation_csv.read_csv(path)
+      self.assertEqual(rows[: len(before)], before)
+      self.assertEqual([row.episode for row in rows[len(before) :]], [1])
+
   def test_a_policy_of_an_unknown_world_is_refused(self):
     policy = self.folder / "policy"
     policy.mkdir()

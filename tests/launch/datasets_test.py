@@ -1,5 +1,6 @@
 """The demonstrations of a run, from several kinds of folders."""
 
+import dataclasses
 import pathlib
 import shlex
 import subprocess
@@ -44,12 +45,18 @@ class DatasetsTest(fixtures.RunTest):
     np.testing.assert_array_equal(
       shown["stack"].observation, again["stack"].observation
     )
+    other = datasets.load(
+      dataclasses.replace(config, seed=1), ["stack"], (59, 4)
+    )
+    self.assertFalse(
+      np.array_equal(other["stack"].observation, shown["stack"].observation)
+    )
 
   def test_collects_into_a_folder_with_blanks(self):
     folder = self.folder / "it's mine; really"
     config = self.config(
       demonstrations=str(folder), collect_missing=True, pairs_per_task=30,
-      environment="", main_task="lift",
+      environment="", main_task="lift", seed=3, control_hz=10,
     )  # fmt: skip
     with (
       mock.patch.object(subprocess, "Popen") as popen,
@@ -63,7 +70,11 @@ class DatasetsTest(fixtures.RunTest):
       with self.assertRaises(KeyboardInterrupt):
         datasets.load(config, ["lift"], (59, 4))
       process.terminate.assert_called_once()  # and not killed
-    self.assertIn(f"--output={folder}", popen.call_args.args[0])
+    self.assertContainsSubset(
+      ["--task=lift", "--pairs_per_task=30", "--seed=3", "--control_hz=10",
+       f"--output={folder}"],
+      popen.call_args.args[0],
+    )  # fmt: skip
     shown = shlex.split(printed.call_args.args[0].partition(": ")[2])
     self.assertEqual(shown[2:], popen.call_args.args[0][2:])
 

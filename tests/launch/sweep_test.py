@@ -89,6 +89,7 @@ class SweepTest(FolderTest):
     engine = FakeEngine(
       {"lfgp_stack_0": [-9, 0], "lfgp_bring_0": [1], "lfgp_stack_1": [-9, -9]}
     )
+    jobs[0].wall_s = 60  # of an earlier sweep
     states = self._run(jobs, engine)
     self.assertEqual(
       states,
@@ -107,6 +108,7 @@ class SweepTest(FolderTest):
     _, rows = csv_files.read(self.folder / "index.csv")
     by_name = {row["name"]: row for row in rows}
     self.assertEqual(by_name["lfgp_stack_0"]["attempts"], "2")
+    self.assertBetween(float(by_name["lfgp_stack_0"]["wall_s"]), 60, 70)
     self.assertEqual(by_name["lfgp_bring_0"]["message"], "error: bad input")
     self.assertEqual(by_name["lfgp_stack_1"]["message"],
                      "killed by SIGKILL")  # fmt: skip

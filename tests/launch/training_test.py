@@ -1,5 +1,6 @@
 """A run from its config to its files, continued, and refused."""
 
+import dataclasses
 import shutil
 import signal
 from unittest import mock
@@ -30,12 +31,17 @@ _WARM_START = {
 
 class TrainingTest(fixtures.RunTest):
   def test_leaves_rows_checkpoints_and_a_policy(self):
-    run, progress = self.train(self.config(evaluate_first=True))
+    run, progress = self.train(
+      self.config(evaluate_first=True, evaluation_seed=5)
+    )
     self.assertEqual(progress.env_step, 200)
     self.assertLen(shared.rows(run / "metrics.csv"), 10)
     rows = evaluation_csv.read_csv(run / "evaluation.csv")
     self.assertEqual({row.env_step for row in rows}, {0, 100, 200})
     self.assertEqual({row.task for row in rows}, {"right", "left"})
+    self.assertEqual(
+      {(row.seed, row.episode) for row in rows}, {(5, 0), (5, 1)}
+    )
     self.assertTrue((run / "checkpoints" / "000000200").is_dir())
     act = lfgp_dmc.load_policy(run, "left")
     self.assertEqual(act(np.zeros(2, np.float32)).shape, (2,))
@@ -286,11 +292,35 @@ class TrainingTest(fixtures.RunTest):
     ):
       self.train(config)
 
-  def test_uses_the_first_pairs_alone(self):
+  def _made(self, name="a", **changes):
+    """The run's folder, and what its training loop was made of."""
     with mock.patch.object(run, "EpisodeRounds") as rounds:
       rounds.return_value.run.return_value = Progress()
-      self.train(self.config(pairs_per_task=20))
-    found = rounds.call_args.args[1]._experts._observation
+      path, _ = self.train(self.config(**changes), name)
+    return path, rounds.call_args.args
+
+  def test_the_schedule_is_that_of_the_config(self):
+    given = {
+      "env_steps": 61, "log_every": 3, "evaluate_every": 5, "random_steps": 7,
+      "checkpoint_every": 11, "updates_per_step": 0.5, "evaluate_first": True,
+    }  # fmt: skip
+    _, (_, _, _, schedule, *_) = self._made(warm_up=13, **given)
+    expected = {**given, "warmup_steps": 13, "progress_bar": False}
+    self.assertEqual(dataclasses.asdict(schedule), expected)
+
+  def test_the_seed_decides_starts_and_networks(self):
+    seeds, policies = [], []
+    for name, seed in (("a", 1), ("b", 1), ("c", 2)):
+      path, arguments = self._made(name, seed=seed)
+      seeds.append(arguments[-1])
+      policies.append((path / "policy.safetensors").read_bytes())
+    for first, same, other in (seeds, policies):
+      self.assertEqual(first, same)
+      self.assertNotEqual(first, other)
+
+  def test_uses_the_first_pairs_alone(self):
+    _, arguments = self._made(pairs_per_task=20)
+    found = arguments[1]._experts._observation
     shown = [
       demonstrations.read(self.dataset / f"{task}.hdf5").observation[:20]
       for task in ("right", "left")

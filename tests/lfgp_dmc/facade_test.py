@@ -131,10 +131,15 @@ class FacadeTest(parameterized.TestCase):
 
 
 class SeedingTest(absltest.TestCase):
+  def test_streams_are_those_of_the_published_results(self):
+    self.assertEqual(seeding.derive(0, "evaluation", 0), 2642558586)
+    self.assertEqual(seeding.derive(7, "collect", "reach", 3), 2571561659)
+
   def test_streams_depend_on_seed_and_path_alone(self):
     paths = [(), ("a",), ("a", 1), ("a1",), ("b", 1), (1,)]
+    paths += [("a", "b"), ("ab",)]
     seeds = {seeding.derive(s, *path) for s in (0, 1) for path in paths}
-    self.assertLen(seeds, 12)
+    self.assertLen(seeds, 16)
     self.assertEqual(seeding.derive(5, "a", 1), seeding.derive(5, "a", 1))
     self.assertEqual(
       seeding.generator(5, "a").random(), seeding.generator(5, "a").random()

@@ -146,12 +146,12 @@ class EpisodeTest(parameterized.TestCase):
     self.assertTrue(env.step(KEEP).mid())
 
   def test_a_divergence_ends_the_episode_with_discount_0_and_is_counted(self):
-    env = lfgp_dmc.load("stack", seed=0)
+    env = lfgp_dmc.load("reach", seed=0, reward="dense")
     env.reset()
     env.physics.data.qvel[0] = np.nan
     timestep = env.step(KEEP)
     self.assertTrue(timestep.last())
-    self.assertEqual(timestep.discount, 0.0)
+    self.assertEqual((timestep.discount, timestep.reward), (0.0, 0.0))
     self.assertEqual(env.physics_failures, 1)
     self.assertTrue(env.reset().first())
     self.assertTrue(env.step(KEEP).mid())
@@ -182,6 +182,14 @@ class StartTest(parameterized.TestCase):
       ("finger_positions", [0.53] * 6, 1e-6),
     ):
       np.testing.assert_allclose(observed[name], expected, atol=tolerance)
+
+  @parameterized.parameters(0.0, 0.4)
+  def test_requested_fingers_stay_until_the_first_command(self, opening):
+    env = fixtures.environment()
+    env.reset_to((0.0, 0.5, 0.25), pose(-0.1), pose(0.1), fingers=opening)
+    for action in (KEEP, [1.0, 0.0, 0.0, 0.0]):
+      seen = fixtures.repeat(env, action, 5).observation["finger_positions"]
+      np.testing.assert_allclose(seen[:2], opening, atol=0.02)
 
   def test_reset_to_samples_what_is_not_requested(self):
     env, blue = fixtures.fresh(), pose()
@@ -244,14 +252,24 @@ class StartTest(parameterized.TestCase):
       env.reset_to(**options)
     self.assertTrue(env.reset().first())
 
-  def test_full_tray_reaches_beyond_the_published_starts(self):
-    env = fixtures.fresh(spawn="full_tray")
-    blocks = np.array(
-      [env.reset().observation["block_positions"] for _ in range(40)]
+  @parameterized.parameters(
+    ("published", (0.07, 0.0755), (0.065, 0.0755)),
+    ("full_tray", (0.12, 0.131), (0.12, 0.151)),
+  )
+  def test_starts_fill_the_floor_they_are_for(self, spawn, of_blocks, of_tcp):
+    env = fixtures.fresh(spawn=spawn)
+    observed = [env.reset().observation for _ in range(40)]
+    blocks, tcp = (
+      np.reshape([seen[name] for seen in observed], (-1, 3))
+      for name in ("block_positions", "ee_position")
     )
-    away = np.abs(blocks.reshape(-1, 3)[:, :2] - ws.CENTRE_XY).max(axis=-1)
-    self.assertGreater(away.max(), 0.1)
-    self.assertLess(away.max(), 0.131)
+    for places, ends in ((blocks, of_blocks), (tcp, of_tcp)):
+      away = np.abs(places[:, :2] - ws.CENTRE_XY).max(axis=0)
+      self.assertBetween(away.min(), *ends)
+      self.assertBetween(away.max(), *ends)
+    heights = tcp[:, 2] - ws.FLOOR_Z
+    self.assertBetween(heights.min(), 0.049, 0.06)
+    self.assertBetween(heights.max(), 0.135, 0.146)
 
   def test_a_buffer_that_comes_and_goes_is_in_the_specification(self):
     env = lfgp_dmc.load("reach", 0)

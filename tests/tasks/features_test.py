@@ -91,6 +91,31 @@ class FeaturesTest(absltest.TestCase):
     rate = (after["ee_position"] - before["ee_position"]) / 0.05
     np.testing.assert_allclose(after["ee_velocity"], rate, atol=2e-3)
 
+  def test_a_block_that_falls_accelerates_by_gravity_and_is_not_moved(self):
+    self.env.reset_to(tcp=(0.1, 0.6, 0.28), blue=pose(-0.1, 0.4, 0.3))
+    falling = fixtures.repeat(self.env, fixtures.KEEP, 2).observation
+    self.assertLess(falling["block_linear_velocities"][2], -0.5)
+    self.assertFalse(falling["condition/move_object"])
+    snapshot = self.env.task.world.reader.snapshot(
+      self.env.physics, fixtures.KEEP, moved=True
+    )
+    self.assertAlmostEqual(snapshot.blue_acceleration, 9.81, places=3)
+
+  def test_torques_are_tanh_of_their_share_of_10_newton_metres(self):
+    self.env.reset_to(tcp=(0.0, 0.5, 0.25), blue=pose(0.0, 0.6))
+    task, physics = self.env.task, self.env.physics
+    sensor = task.world.panda.sensors["torque"]
+
+    def torque():
+      return np.array(physics.bind(sensor).sensordata)
+
+    at_rest = torque()
+    moving = self.env.step([1.0, -1.0, 0.0, 0.0]).observation
+    added = torque() - at_rest
+    self.assertGreater(np.abs(added).max(), 0.05)
+    read = np.arctanh(moving["force_torque"][3:]) * 10.0
+    np.testing.assert_allclose(read, added, atol=0.01)
+
   def test_wrist_reads_zero_unloaded_and_the_weight_of_a_block(self):
     self.env.reset_to(tcp=pose()[:3], blue=pose(), green=pose(0.1, 0.6))
     unloaded = fixtures.repeat(self.env, fixtures.KEEP, 5).observation

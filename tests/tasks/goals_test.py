@@ -57,7 +57,9 @@ class ConditionsTest(parameterized.TestCase):
     ("closes", "close_gripper", _CLOSES, True),
     ("near_green", "close_gripper", {**_CLOSES, **_NEAR_GREEN}, True),
     ("far_away", "close_gripper", {**_CLOSES, "tcp": (0.0, 0.5, 0.246)}, False),
+    ("not_far", "close_gripper", {**_CLOSES, "tcp": (0.0, 0.5, 0.244)}, True),
     ("too_fast", "close_gripper", {**_CLOSES, "tcp_speed": 0.081}, False),
+    ("slow_enough", "close_gripper", {**_CLOSES, "tcp_speed": 0.079}, True),
     ("reached", "reach", {"tcp": (0.0, 0.5149, 0.145)}, True),
     ("not_reached", "reach", {"tcp": (0.0, 0.5151, 0.145)}, False),
     ("lifted", "lift", {"blue": (0.0, 0.5, 0.2051)}, True),
@@ -65,6 +67,7 @@ class ConditionsTest(parameterized.TestCase):
     ("moves", "move_object", {"blue_speed": 0.051}, True),
     ("too_slow", "move_object", {"blue_speed": 0.049}, False),
     ("jerks", "move_object", _JERKS, False),
+    ("smooth", "move_object", {**_JERKS, "blue_acceleration": 4.9}, True),
   )
   def test_condition(self, task, changes, expected):
     self.assertIs(GOALS[task].condition(state(**changes)), expected)
@@ -90,6 +93,15 @@ class RewardsTest(parameterized.TestCase):
     inwards = dataclasses.replace(at_edge, action=(-1.0, 0.0, 1.0, 0.0))
     self.assertEqual(terms.limits(inwards), 0.0)
 
+  @parameterized.product(axis=(0, 1, 2), side=(-1, 1))
+  def test_every_face_of_the_box_limits(self, axis, side):
+    face = (ws.SET_POINT_LOW if side < 0 else ws.SET_POINT_HIGH)[axis]
+    for inside, expected in ((0.004, -0.1), (0.006, 0.0)):
+      tcp, action = [0.0, 0.5, 0.2], [0.0] * 4
+      tcp[axis], action[axis] = face - side * inside, side
+      at_face = state(tcp=tuple(tcp), action=tuple(action))
+      self.assertAlmostEqual(terms.limits(at_face), expected)
+
   def test_open_is_1_less_half_the_movement_near_a_block(self):
     opens = {"action": (0.3, 0.4, 0.0, -1.0)}
     self.check("open_gripper", 0.75, **opens)
@@ -107,11 +119,20 @@ class RewardsTest(parameterized.TestCase):
     at = {"blue": (0.0, 0.5, z), "tcp": (0.0, 0.5, z)}
     self.check("lift", expected, fingers=(opening, opening), **at)
 
+  @parameterized.parameters((0.11, 0.4), (0.09, 0.1))
+  def test_lift_pays_a_grasp_on_the_floor_once_it_moves_up(self, up, expected):
+    held = {"tcp": _REST.blue, "fingers": (0.5, 0.5)}
+    self.check("lift", expected, action=(0.0, 0.0, up, 1.0), **held)
+
   def test_move_object_pays_speed_and_carrying_less_jerk(self):
     # 5 x 0.1 + near 0.1 + carried 0.1 - 0.1 x min(3, 1.5).
     at = {"blue": (0.0, 0.5, 0.165), "tcp": (0.0, 0.5, 0.165)}
     speed = {"blue_speed": 0.1, "blue_acceleration": 3.0}
     self.check("move_object", 0.55, fingers=(0.5, 0.5), **at, **speed)
+    # The same speed counts within 4 cm of the hand alone.
+    for distance, expected in ((0.039, 0.6), (0.041, 0.1)):
+      tcp = (0.0, 0.5, 0.145 + distance)
+      self.check("move_object", expected, tcp=tcp, blue_speed=0.1)
 
   def test_bring_pays_closeness_then_letting_go(self):
     at = {"blue": (0.035, 0.53, 0.145), "tcp": (0, 0.5, 0.145)}
@@ -119,6 +140,7 @@ class RewardsTest(parameterized.TestCase):
     # At the goal, opening, 2 cm away: 1.5 + 0.3 x 0.5.
     above = {"tcp": (0.075, 0.5, 0.165), "action": (0, 0, 0, -1.0)}
     self.check("bring", 1.65, **_IN_ZONE, **above)
+    self.check("bring", 1.5, **_IN_ZONE, tcp=above["tcp"])  # not opening
 
   def test_insert_wants_a_millimetre(self):
     almost = 1 - math.tanh(0.1)
@@ -130,6 +152,10 @@ class RewardsTest(parameterized.TestCase):
     at = {"blue": (-0.1, 0.5, 0.186), "tcp": (-0.1, 0.5, 0.206)}
     opens = {"fingers": (0.5, 0.5), "action": (0.0, 0.0, 0.0, -0.5)}
     self.check("stack", 3.7, **at, **opens)
+    self.check("stack", 3.2, blue_speed=0.011, **at, **opens)  # no retreat
+    # 6 mm too high: neither placed nor to be opened for.
+    high = {"blue": (-0.1, 0.5, 0.192), "tcp": (-0.1, 0.5, 0.212)}
+    self.check("stack", 0.7 + 1 - math.tanh(0.06), **high, **opens)
     self.check("stack", 0.0, tcp=(0.0, 0.5, 0.246))
 
   def test_stack_lift_term_rises_to_35_mm_and_not_to_7(self):

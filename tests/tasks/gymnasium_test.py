@@ -99,6 +99,19 @@ class GymnasiumTest(parameterized.TestCase):
     *_, truncated, _ = other.step(np.zeros(4, np.float32))
     self.assertTrue(truncated)
 
+  def test_a_broken_simulation_is_reported_and_truncates(self):
+    env = gymnasium.make(_IDS["reach"], control_hz=5)
+    self.assertEqual(env.unwrapped.metadata["render_fps"], 5)
+    env.reset(seed=0)
+    env.unwrapped._env.physics.data.qvel[0] = np.nan
+    step = env.unwrapped.step(np.zeros(4, np.float32))
+    _, reward, terminated, truncated, info = step
+    self.assertTrue(info["physics_failure"])
+    self.assertTrue(truncated)
+    self.assertFalse(terminated)
+    self.assertEqual(reward, 0.0)
+    env.close()
+
   def test_success_is_reported_and_does_not_end_the_episode(self):
     env = gymnasium.make(_IDS["reach"])
     blue = fixtures.pose()

@@ -48,6 +48,16 @@ class PublishedExamplesTest(FolderTest):
     tilt = np.linalg.norm(stacked[:, 16:18], axis=1)
     self.assertLess(np.median(tilt), 0.02)
 
+  def test_actions_beyond_the_bounds_are_clipped(self):
+    path = self.folder / "lift.npz"
+    with np.load(path, allow_pickle=False) as part:
+      rows = dict(part)
+    rows["action"][1] = (1.5, -2.0, 0.5, 1.0)
+    np.savez(path, **rows)
+    found = self.read("lift")["lift"].action
+    np.testing.assert_array_equal(found[1], [1.0, -1.0, 0.5, 1.0])
+    self.assertEqual(found.dtype, np.float32)
+
   def test_every_fault_is_reported(self):
     (self.folder / "lift.npz").write_bytes(b"nothing")
     rows = {"observation": np.zeros((2, 53)), "action": np.zeros((2, 4))}

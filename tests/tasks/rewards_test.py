@@ -43,6 +43,14 @@ class RewardTest(parameterized.TestCase):
     self.assertEqual(env.step(_OPENS).reward, 1.0)
     self.assertEqual(env.step(_CLOSES).reward, 0.0)
 
+  def test_an_episode_begins_without_the_last_ones_action_or_success(self):
+    env = self.start()
+    self.assertTrue([self.opened(env, _OPENS) for _ in range(10)][-1])
+    first = env.reset_to(tcp=(0.0, 0.5, 0.2), blue=pose()).observation
+    self.assertFalse(first["condition/open_gripper"])
+    self.assertFalse(first["success/open_gripper"])
+    self.assertFalse(any(self.opened(env, _OPENS) for _ in range(9)))
+
   def test_success_needs_ten_checks_then_latches_until_cleared(self):
     env = self.start()
     opened = functools.partial(self.opened, env)

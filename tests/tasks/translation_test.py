@@ -80,7 +80,7 @@ class TranslationTest(parameterized.TestCase):
     np.testing.assert_array_equal(found.action[-40:], shown.action)
     self.assertEmpty(demonstration_checks.of_arrays(found.arrays(), None, None))
     shift = (found.observation - np.tile(rows, (21, 1)))[:, 12:14]
-    self.assertLessEqual(np.abs(shift).max(), 0.0801)
+    self.assertBetween(np.abs(shift).max(), 0.07, 0.0801)
     for episode in np.unique(found.episode):
       of_attempt = shift[found.episode == episode]
       np.testing.assert_allclose(np.ptp(of_attempt, axis=0), 0, atol=1e-6)

@@ -1,13 +1,14 @@
 """Collection: exact counts, successes only, leads, the same for any workers."""
 
 import dataclasses
+from unittest import mock
 
 import numpy as np
 from absl.testing import absltest, parameterized
 
 import lfgp_dmc
 from lfgp_dmc import toy
-from lfgp_dmc.acting import collection
+from lfgp_dmc.acting import attempts, collection
 from lfgp_dmc.acting.attempts import CollectionPlan, Collector
 from lfgp_dmc.tasks import experts
 
@@ -24,6 +25,16 @@ class _RightOnly(toy.WalkingActor):
 
   def begin(self, task, seed):
     super().begin("right", seed)
+
+
+class _EverySecond(toy.WalkingActor):
+  """Fails each second time, and fails the first."""
+
+  _count = 0
+
+  def begin(self, task, seed):
+    self._count += 1
+    super().begin(task if self._count % 2 == 0 else "left", seed)
 
 
 class _Recorder(toy.WalkingActor):
@@ -148,6 +159,40 @@ class CollectTest(parameterized.TestCase):
   def test_a_task_that_never_succeeds_is_given_up(self):
     with self.assertRaisesRegex(collection.NoSuccessError, "left: 200 att"):
       _collect(_plan(_RightOnly), pairs=10)
+
+  def test_only_failures_in_a_row_give_a_task_up(self):
+    plan = _plan(_EverySecond, limits={"right": 10})
+    with mock.patch.object(collection, "_MOST_FAILURES", 2):
+      part = _collect(plan, tasks=("right",), pairs=30)["right"]
+    self.assertGreater(part.successes, 4)
+    self.assertEqual(part.attempts, 2 * part.successes)
+
+  def test_play_draws_its_tasks(self):
+    collector = Collector(_plan())
+    firsts = [collector((None, [i]))[1][0].task for i in range(40)]
+    self.assertBetween(firsts.count("right"), 10, 30)
+
+  def test_play_is_reset_after_its_steps(self):
+    for number in range(5):
+      _, made = Collector(_plan(play_steps=10))((None, [number]))
+      self.assertLessEqual(sum(len(one.rows.action) for one in made), 10)
+
+  def test_what_a_reset_interrupts_is_no_failure(self):
+    for part in _collect(_plan(), "play", pairs=60).values():
+      self.assertEqual(part.attempts, part.successes)
+
+  def test_each_attempt_at_play_has_noise_of_its_own(self):
+    data = _collect(_plan(), "play", pairs=60)["right"].demonstrations
+    firsts = data.action[np.unique(data.episode, return_index=True)[1]]
+    self.assertLen(np.unique(firsts[:, 1]), len(firsts))
+
+  @parameterized.parameters(
+    (20, 90, 120, 150, 240), (10, 90, 120, 150, 180), (5, 45, 60, 75, 90)
+  )
+  def test_limits_have_twice_the_time_at_lower_rates(self, rate, *steps):
+    plan = _plan(control_hz=rate, limits=attempts.LIMITS)
+    tasks = ("lift", "unstack_stack", "bring", "insert")
+    self.assertEqual([plan.limit(task) for task in tasks], list(steps))
 
   def test_failures_are_counted_and_broken_physics_dropped(self):
     plan = _plan(make_environment=lambda task: _PlayPoint(fail_every=2))

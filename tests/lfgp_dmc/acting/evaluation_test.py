@@ -2,7 +2,9 @@
 
 import functools
 import os
+from unittest import mock
 
+import dm_env
 import numpy as np
 from absl.testing import absltest
 
@@ -66,6 +68,26 @@ class EvaluateTest(absltest.TestCase):
     both, left = _evaluate(), _evaluate(tasks=("left",))
     self.assertEqual(both[3:], left)
 
+  def test_resets_are_the_same_for_every_task(self):
+    environment = toy.PointEnvironment()
+    with mock.patch.object(
+      environment, "reseed", wraps=environment.reseed
+    ) as reseed:
+      _evaluate(lambda: environment)
+    seeds = [call.args[0] for call in reseed.call_args_list]
+    self.assertEqual(seeds[:3], seeds[3:])
+    self.assertLen(set(seeds), 3)
+
+  def test_steps_to_success_count_the_step_that_succeeds(self):
+    class Near(toy.PointEnvironment):
+      def reset(self):
+        super().reset()
+        self._position = np.array([0.45, 0.0])
+        return dm_env.restart(self._observe())
+
+    (row, *_) = _evaluate(Near, tasks=("right",))
+    self.assertEqual(row.steps_to_success, 1)
+
   def test_resets_follow_the_seed(self):
     returns = [
       [row.episode_return for row in _evaluate(make_actor=_Steady, seed=seed)]
@@ -109,6 +131,13 @@ class FilesTest(FolderTest):
     path.write_text("env_step\n1\n")
     with self.assertRaisesRegex(ValueError, "a.csv is no evaluation"):
       evaluation_csv.read_csv(path)
+
+  def test_the_newest_evaluation_is_that_of_the_latest_step(self):
+    steps = (1000, 3000, 2000, 3000)
+    rows = [_ROWS[0]._replace(env_step=step) for step in steps]
+    newest = evaluation_csv.newest(rows)
+    self.assertEqual([row.env_step for row in newest], [3000, 3000])
+    self.assertEmpty(evaluation_csv.newest([]))
 
   def test_table(self):
     lines = evaluation_csv.success_table(_ROWS).splitlines()

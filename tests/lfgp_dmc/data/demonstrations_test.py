@@ -24,8 +24,14 @@ _FAULTS = {
     lambda a: np.where(a == a[2], np.float32(np.nan), a),
     "NaN or infinity in 1 rows, first in row 2",
   ),
+  "nan_after": (
+    "next_observation",
+    lambda a: np.where(a == a[4], np.float32(np.inf), a),
+    "'next_observation' has NaN or infinity in 1 rows, first in row 4",
+  ),
   "range": ("action", lambda a: a * 3, r"'action' leaves \[-1, 1\]"),
   "empty": ("observation", lambda a: a[:0], "holds no pair"),
+  "negative": ("episode", lambda a: a - 1, "'episode' is negative"),
   "decreasing": ("episode", lambda a: a[::-1].copy(), "decreases"),
   "inside": ("is_last", np.ones_like, "true inside an episode"),
 }
@@ -104,6 +110,11 @@ class DemonstrationsTest(fixtures.FolderTest):
       h5py.Group, "create_dataset", side_effect=KeyboardInterrupt
     )
     with interrupt, self.assertRaises(KeyboardInterrupt):
+      self._write()
+    self.assertEmpty(list(self.folder.iterdir()))
+
+  def test_a_full_disk_leaves_nothing(self):
+    with fixtures.full_disk(1000), self.assertRaises(OSError):
       self._write()
     self.assertEmpty(list(self.folder.iterdir()))
 

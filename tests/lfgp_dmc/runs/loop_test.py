@@ -127,8 +127,15 @@ class LoopTest(fixtures.FolderTest, parameterized.TestCase):
   def test_physics_failures_are_dropped(self):
     agent = _Agent()
     environment = toy.PointEnvironment(fail_every=2)
-    with self.assertLogs(level="WARNING"):
+    with (
+      self.assertLogs(level="WARNING"),
+      mock.patch.object(
+        environment, "reseed", wraps=environment.reseed
+      ) as reseed,
+    ):
       progress = self._train(agent, environment, env_steps=60)
+    # Another start each, also after a failure.
+    self.assertLen({call.args[0] for call in reseed.call_args_list}, 4)
     # 20 good, 10 dropped, 20 good, 10 dropped.
     self.assertEqual((progress.episodes, progress.physics_failures), (2, 2))
     self.assertLen(self._replay, 40)
@@ -244,6 +251,12 @@ class LoopTest(fixtures.FolderTest, parameterized.TestCase):
     self.assertEqual(progress.episodes, 4)
     after = self._replay.gather(np.arange(10))
     self.assertFalse(np.array_equal(cut.action, after.action))
+
+  def test_a_resumed_run_goes_on_counting_its_seconds(self):
+    progress = self._train(_Agent(), progress=Progress(60, wall_s=1000.0))
+    self.assertBetween(progress.wall_s, 1000, 1100)
+    for row in self._rows():
+      self.assertBetween(float(row["wall_s"]), 1000, 1100)
 
   def test_a_finished_run_is_left_alone(self):
     self._train(_Agent(), progress=Progress(env_step=100))

@@ -1,6 +1,7 @@
 """A run's files: CSV and TensorBoard, folder and config, atomic writing."""
 
 import datetime
+from unittest import mock
 
 from tensorboard.backend.event_processing import event_accumulator
 
@@ -20,13 +21,34 @@ class FilesTest(fixtures.FolderTest):
     self.assertEqual(files.read_json(path), {"kept": 1})
     self.assertLen(list(self.folder.iterdir()), 1)
 
+  def test_content_is_on_disk_before_it_has_the_name(self):
+    path, flushed = self.folder / "a.json", []
+
+    def flush(place):
+      flushed.append((place.parent, path.exists()))
+
+    with mock.patch.object(files, "flush_to_disk", flush):
+      files.write_json(path, {})
+    self.assertEqual(
+      flushed, [(self.folder, False), (self.folder.parent, True)]
+    )
+
   def test_a_full_disk_names_the_file(self):
     path = self.folder / "a.csv"
     csv_files.write(path, ["env_step"], [{"env_step": 1}])
     many = [{"env_step": 10**9}] * 9000
     for write in (csv_files.write, csv_files.append):
+      before = csv_files.read(path)
+      self.assertEqual(before[1], [{"env_step": "1"}])
       with fixtures.full_disk(), self.assertRaisesRegex(OSError, "a.csv"):
         write(path, ["env_step"], many)
+
+  def test_a_full_disk_leaves_json_as_it_was(self):
+    path = self.folder / "a.json"
+    files.write_json(path, {"kept": 1})
+    with fixtures.full_disk(), self.assertRaisesRegex(OSError, "a.json"):
+      files.write_json(path, ["new"] * 9000)
+    self.assertEqual(files.read_json(path), {"kept": 1})
 
   def test_a_damaged_csv_is_named(self):
     path = self.folder / "a.csv"
@@ -74,6 +96,12 @@ class MetricsLogTest(fixtures.FolderTest):
     log.write({"env_step": 1200, "a": 7})
     steps = [row["env_step"] for row in self._rows()[1]]
     self.assertEqual(steps, ["500", "1000", "1200"])
+    log.close()
+    events = event_accumulator.EventAccumulator(
+      str(self.folder / "tensorboard")
+    ).Reload()
+    found = [(event.step, event.value) for event in events.Scalars("a")]
+    self.assertEqual(found, [(500, 500), (1000, 1000), (1200, 7)])
 
   def test_tensorboard_reads_the_events(self):
     log = MetricsLog(self.folder)

@@ -7,6 +7,7 @@ from unittest import mock
 import numpy as np
 
 from lfgp_dmc import toy
+from lfgp_dmc.acting import workers
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import checkpoints, run, run_folder
@@ -64,8 +65,14 @@ class _Agent(fixtures.ToyAgent):
     self._summed = state["summed"]
 
 
+def _evaluate(step):
+  return [EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)]
+
+
 class ResumingTest(fixtures.FolderTest):
-  def _run(self, path: pathlib.Path, die_at=None, resume=False):
+  def _run(
+    self, path: pathlib.Path, die_at=None, resume=False, evaluate=_evaluate
+  ):
     """Trains 400 steps, or until the kill; a full ring with slack."""
     open_folder = run_folder.resume if resume else run_folder.create
     folder = open_folder(path, _CONFIG)
@@ -81,9 +88,10 @@ class ResumingTest(fixtures.FolderTest):
         evaluate_every=100,
         checkpoint_every=60,
         warmup_steps=30,
+        updates_per_step=0.3,  # a fraction is due at checkpoints
         progress_bar=False,
       ),
-      lambda step: [EvaluationRow(step, "right", 0, 3, 1, 4, 0.5)],
+      evaluate,
       _CONFIG,
       seed=3,
     )
@@ -141,6 +149,38 @@ class ResumingTest(fixtures.FolderTest):
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
 
+  def test_killed_before_rows_or_checkpoint_reach_the_disk(self):
+    for owner, name in ((Replay, "flush"), (checkpoints, "save")):
+      path, real, calls = self.folder / name, getattr(owner, name), []
+
+      def die_at_the_third(*args, real=real, calls=calls):
+        calls.append(args)
+        if len(calls) == 3:
+          raise _Killed
+        return real(*args)
+
+      with (
+        mock.patch.object(owner, name, die_at_the_third),
+        self.assertRaises(_Killed),
+      ):
+        self._run(path)
+      self._run(path, resume=True)
+      self.assertEqual(self._numbers(path), self._whole)
+
+  def test_killed_after_an_evaluation_that_was_made_up_for(self):
+    path = self.folder / "killed"
+
+    def lose(step):
+      raise workers.LostWorkerError("killed")
+
+    with self.assertRaises(workers.LostWorkerError):
+      self._run(path, evaluate=lose)  # leaves a checkpoint, and a debt
+    with self.assertRaises(_Killed):
+      self._run(path, die_at=10, resume=True)
+    self.assertLen(fixtures.rows(path / "evaluation.csv"), 1)
+    self._run(path, resume=True)
+    self.assertEqual(self._numbers(path), self._whole)
+
   def test_a_damaged_newest_checkpoint_falls_back(self):
     path = self._killed(250)
     newest = checkpoints.every(path / "checkpoints")[-1]
@@ -166,6 +206,11 @@ class ResumingTest(fixtures.FolderTest):
     rows = self._numbers(path)[0]
     self.assertEqual(rows[-1]["env_step"], "400")
     self.assertLess(int(rows[-1]["update"]), int(self._whole[0][-1]["update"]))
+
+  def test_a_checkpoint_of_each_tenth_is_kept(self):
+    found = checkpoints.every(self.folder / "whole" / "checkpoints")
+    steps = [int(path.name) for path in found]
+    self.assertEqual(steps, [60, 120, 180, 240, 300, 360, 400])
 
   def test_killed_before_the_first_checkpoint(self):
     path = self._killed(50)

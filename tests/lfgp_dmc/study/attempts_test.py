@@ -66,6 +66,13 @@ class AttemptsTest(FolderTest):
     ):
       self._points("dac")
 
+  def test_over_a_single_seed_an_improvement_has_no_interval(self):
+    rows = ("lfgp,stack,5,0,,0.8,,", "lfgp,stack,5,1,,0.2,,")
+    results = self._read(*rows, "bc,stack,5,0,,0.4,,")
+    lfgp = attempts.summary(results, "bc")[0]
+    self.assertEqual(lfgp.improvement, 0.5)
+    np.testing.assert_array_equal(lfgp[9:], [np.nan, np.nan])
+
   def test_a_single_seed_has_the_interval_of_its_resets(self):
     header = "method,main_task,attempts,seed,success,episodes"
     (point,) = attempts.summary(

@@ -107,6 +107,7 @@ class StudyTest(FolderTest):
 
   @parameterized.parameters(
     ("lfgp", {"demonstrations": "data/stack_reset", "transfer_from": ""}),
+    ("lfgp", {"demonstrations": "play/display_reset"}),
     ("lfgp_play", {"demonstrations": "data/stack_play"}),
     ("lfgp_transfer", {"transfer_from": "runs/a"}),
   )

@@ -81,6 +81,28 @@ class ExpertTest(parameterized.TestCase):
     np.testing.assert_array_equal(actions[0], actions[1])
     self.assertFalse((actions[0] == actions[2]).any())
 
+  def test_a_slower_step_covers_what_four_would(self):
+    # 6 mm above where it wants to be: 40 % of the way in 50 ms, 87 % in 200.
+    start = {"tcp": (0.0, 0.5, 0.154), "blue": pose(), "green": pose(-0.1)}
+    seen = flatten(environment("reach").reset_to(**start).observation)
+    moves = []
+    for rate in (20, 5):
+      expert = ScriptedExpert(noise=0.0, control_hz=rate)
+      expert.begin("reach", 0)
+      moves.append(expert.act(seen)[2] * ws.SET_POINT_SPEED / rate)
+    np.testing.assert_allclose(
+      moves, [-0.4 * 0.006, -(1 - 0.6**4) * 0.006], rtol=0.05
+    )
+
+  def test_the_noise_is_a_quarter_of_its_own_at_rest(self):
+    start = {"tcp": (0.0, 0.5, 0.2), "blue": pose(), "green": pose(-0.1)}
+    seen = flatten(environment("reach").reset_to(**start).observation)
+    for noise in (0.1, 0.02):
+      expert = ScriptedExpert(noise=noise)
+      expert.begin("open_gripper", 0)  # whose noise is five times the usual
+      moves = np.array([expert.act(seen)[:3] for _ in range(300)])
+      self.assertAlmostEqual(moves.std() / (noise * 5 / 4), 1, delta=0.1)
+
   def test_unknown_task_and_noise_list_the_valid_ones(self):
     with self.assertRaisesRegex(ValueError, "'fly'; valid tasks: stack, "):
       ScriptedExpert().begin("fly", 0)
