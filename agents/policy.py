@@ -90,6 +90,8 @@ class Policy:
       ValueError: a file is missing or damaged; the message names it.
       OSError: a file may not be read.
     """
+    if Path(folder).is_file():
+      raise ValueError(f"{folder} is a file; valid: the policy's folder")
     config_path = Path(folder) / CONFIG_NAME
     arrays_path = Path(folder) / ARRAYS_NAME
     for path in (config_path, arrays_path):

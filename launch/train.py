@@ -18,7 +18,7 @@ from absl import flags
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.launch import command, config_flags, configs
 from lfgp_dmc.launch.command import UserError
-from lfgp_dmc.runs import run_folder
+from lfgp_dmc.runs import checkpoints, run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 from lfgp_dmc.runs.schedule import Progress
 
@@ -42,9 +42,12 @@ def main() -> int:
   print(f"{config.algorithm} on {config.main_task}, run folder {path}")
   from lfgp_dmc.launch import training  # loads torch: not for --help
 
+  stored = checkpoints.every(RunFolder(path).checkpoints)
   progress = training.train(config, path, _RESUME.value)
   if progress.is_complete:  # whoever stops a run waits
     training.draw(path)
+    if stored and int(stored[-1].name) == progress.env_step:
+      print("there was nothing left to train; --config.env_steps=MORE goes on")
   return report(config, path, progress)
 
 

@@ -1,6 +1,7 @@
 """Stored policies: save and load, acting, faults."""
 
 import json
+import pathlib
 
 import numpy as np
 import torch
@@ -75,6 +76,11 @@ class ActingTest(absltest.TestCase):
     many = policy.act(rows, generator=np.random.default_rng(0))
     mean = policy.act(row, deterministic=True)
     np.testing.assert_allclose(np.median(many, axis=0), mean, atol=0.05)
+
+  def test_a_file_in_the_place_of_its_folder_is_named(self):
+    path = pathlib.Path(__file__)
+    with self.assertRaisesRegex(ValueError, "is a file; valid: the policy's f"):
+      Policy.load(path)
 
   def test_samples_spread_by_the_networks_std(self):
     network, row = _network(), _observation()
