@@ -4,13 +4,12 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from lfgp_dmc.data.demonstrations import Demonstrations
-from lfgp_dmc.data.replay import Replay
-
-if TYPE_CHECKING:  # torch is loaded when an agent is built
+if TYPE_CHECKING:  # torch and h5py are loaded when an agent is built
   import torch
 
   from lfgp_dmc.agents.networks.encoder import Encoder
+  from lfgp_dmc.data.demonstrations import Demonstrations
+  from lfgp_dmc.data.replay import Replay
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -18,8 +17,8 @@ class AgentParts:
   """The same for all algorithms; each takes what it needs."""
 
   tasks: tuple[str, ...]  # that are learned, the main task first
-  demonstrations: Mapping[str, Demonstrations]  # of each; may be empty
-  replay: Replay | None  # which the training loop fills; cloning has none
+  demonstrations: "Mapping[str, Demonstrations]"  # of each; may be empty
+  replay: "Replay | None"  # which the training loop fills; cloning has none
   seed: int  # all random numbers follow from it
   device: "torch.device | str"
   observation_size: int  # O; of cloning from pixels, without them
