@@ -136,7 +136,8 @@ def _output() -> pathlib.Path | None:
   if not _OUTPUT.value:
     # Whoever evaluates a stored policy again does not change its folder.
     run = RunFolder(pathlib.Path(_RUN.value))
-    return run.evaluation if _RUN.value and run.is_run else None
+    keeps = run.is_run or run.evaluation.exists() or run.checkpoints.exists()
+    return run.evaluation if _RUN.value and keeps else None
   path = pathlib.Path(_OUTPUT.value) / _NAME
   if path.exists():
     raise UserError(f"{path} exists; choose another --output")

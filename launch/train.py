@@ -47,7 +47,7 @@ def main() -> int:
   if progress.is_complete:  # whoever stops a run waits
     training.draw(path)
     if stored and int(stored[-1].name) == progress.env_step:
-      print("there was nothing left to train; --config.env_steps=MORE goes on")
+      print(f"the run was at its end already, at {progress.env_step}")
   return report(config, path, progress)
 
 

@@ -89,7 +89,7 @@ def _train(
       is_useless = checkpoints.latest(folder.checkpoints) is None
     if is_useless and not resume:  # as if it had not been tried
       shutil.rmtree(path)
-    if is_input:
+    if is_input and not sizes.is_memory_fault(error):
       raise UserError(str(error)) from error
     raise
 

@@ -101,7 +101,7 @@ def _handle(number: int, frame: Any) -> None:
     raise KeyboardInterrupt
   _current.is_made = True
   logging.warning(
-    "%s: stopping at the end of an episode or epoch; once more, after %.0f "
+    "%s: stopping once a checkpoint can be written; once more, after %.0f "
     "seconds, to stop now",
     signal.Signals(number).name,
     _REPEAT,

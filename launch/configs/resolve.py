@@ -62,8 +62,8 @@ def make_config(
       raise ValueError(f"unknown {what} {name!r}; valid: {', '.join(valid)}")
   chosen = ALGORITHMS[algorithm]
   of_preset = {**PRESETS[preset], **OF_TASK.get((preset, main_task), {})}
-  if environment:
-    of_preset = _without_blocks(of_preset)
+  if environment:  # whose tasks are not ours, even of the same name
+    of_preset = _without_blocks(PRESETS[preset], kinds or {})
   applying = {
     name: value
     for name, value in of_preset.items()
@@ -155,12 +155,14 @@ def hint(name: str, known: Iterable[str], prefix: str = "config.") -> str:
   return f"did you mean {' or '.join(prefix + other for other in close)}?"
 
 
-def _without_blocks(of_preset: Mapping[str, Any]) -> dict[str, Any]:
+def _without_blocks(
+  of_preset: Mapping[str, Any], kinds: Mapping[str, str]
+) -> dict[str, Any]:
   """A preset for environments of which it knows nothing."""
   kept = {k: v for k, v in of_preset.items() if k not in OF_BLOCKS}
   kind = "agent.scheduler.kind"
   return {
-    k: "weighted_random" if (k, v) == (kind, HANDCRAFTED) else v
+    k: kinds.get(k, "weighted_random") if (k, v) == (kind, HANDCRAFTED) else v
     for k, v in kept.items()
   }
 

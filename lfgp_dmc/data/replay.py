@@ -38,8 +38,8 @@ class Replay(Ring):
       reward_tasks: whose dense rewards are kept beside each row.
       slack: rows kept intact beyond the capacity; at least the rows added
         between two checkpoints where a full ring must resume exactly: with
-        less, it resumes without those that were overwritten. An existing folder
-        keeps its own.
+        less, it resumes without those that were overwritten, and a few more. An
+        existing folder keeps its own.
       read_only: whether the folder's files are never written to.
 
     Raises:
@@ -175,9 +175,25 @@ class Replay(Ring):
     for mapped in self._mapped:
       mapped.flush()
     self._flushed = self.total
-    slack = self._size - self.capacity
-    self._promised = max(self._promised, self._written, self.total + slack)
     self._describe(self._written)
+    self._promised = self._allowed(self.total)
+
+  def rewind(self, total: int) -> None:
+    """See `Ring`; rows up to there are kept from then on."""
+    super().rewind(total)
+    self._promised = min(self._promised, self._allowed(total))
+
+  def clear(self) -> None:
+    """Forgets every row."""
+    super().clear()
+    self._flushed, self._promised = 0, self._size
+    if self._folder is not None and (self._folder / SIDECAR).exists():
+      self._describe(0)
+
+  def _allowed(self, total: int) -> int:
+    """Rows ever added that overwrite none of a flush at `total`."""
+    slack = self._size - self.capacity
+    return max(self._size, self._written, total + slack)
 
   def _describe(self, written: int) -> None:
     """Writes the sidecar."""
@@ -195,8 +211,9 @@ class Replay(Ring):
     """Writes to `rows` of the arrays; counts `count` new ones."""
     if self._folder is not None and self.total + count > self._promised:
       # Rows of the last flush go: a kill must not leave them in the count.
-      self._promised = self.total + count + self.capacity // 10
-      self._describe(self._promised)
+      promised = self.total + count + self.capacity // 10
+      self._describe(promised)
+      self._promised = promised
     while self._mapped and self._reserved <= np.max(rows, initial=-1):
       stops = [mapped_rows.reserve(m, self._reserved) for m in self._mapped]
       self._reserved = stops[0]
@@ -242,8 +259,7 @@ class Replay(Ring):
       )
     self.total, self._written = found["total"], found["written"]
     self._flushed = self.total
-    slack = self._size - self.capacity
-    self._promised = max(self._size, self._written, self.total + slack)
+    self._promised = self._allowed(self.total)
 
 
 def _read_sidecar(folder: pathlib.Path) -> dict[str, Any]:

@@ -123,7 +123,7 @@ def _replace(aside: pathlib.Path, final: pathlib.Path) -> None:
   final.rename(old)
   try:
     aside.rename(final)
-  except OSError:
+  except BaseException:
     old.rename(final)
     raise
   shutil.rmtree(old)

@@ -142,6 +142,9 @@ class Run:
 
 
 def _rewind(replay: Replay, total: int) -> None:
+  if not total:  # of before the first checkpoint
+    replay.clear()
+    return
   try:
     replay.rewind(total)
   except ValueError as error:

@@ -115,8 +115,9 @@ def resume(
     complete: gives a stored config the fields that are newer than the run.
 
   Raises:
-    ValueError: there is no such run, its config differs (the message names
-      the fields), or another process is running it.
+    ValueError: there is no such run, another process is running it, or its
+      config differs (the message names the fields).
+    OSError: it may not be written to.
   """
   path = pathlib.Path(path)
   known = complete(settings(read_config(path)))

@@ -155,6 +155,26 @@ class MappedReplayTest(fixtures.FolderTest):
       stored = Replay.stored(self._folder / str(slack))
       self.assertEqual(_numbers(stored), [*range(40, 50)])
 
+  def test_a_promise_to_a_flush_outlives_neither_it_nor_a_rewind(self):
+    for slack, counts, back, first in (
+      (0, (100, 101), 101, 1),
+      (5, (105, 111), 111, 11),
+      (50, (200, 240), 200, 100),
+    ):
+      folder = self._folder / str(slack)
+      replay, done = Replay(100, 3, 2, folder, slack=slack), 0
+      for count in counts:
+        _fill(replay, range(done, count))
+        replay.flush()
+        done = count
+      replay.rewind(back)
+      _fill(replay, range(back, back + slack + 9))  # then killed
+      again = Replay(100, 3, 2, folder)
+      again.rewind(back)
+      intact = _numbers(again)
+      self.assertEqual(intact, [*range(first, back)][-len(intact) :])
+      self.assertGreater(len(intact), 60)
+
   def test_files_are_sparse(self):
     Replay(1_000_000, 59, 4, self._folder)
     used = sum(f.stat().st_blocks * 512 for f in self._folder.iterdir())
