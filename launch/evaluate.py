@@ -56,7 +56,7 @@ _OUTPUT = flags.DEFINE_string(
   "output",
   "",
   "Folder for evaluation.csv; default: the run's own, where training's rows "
-  "are kept and those it does not have yet appended.",
+  "are kept and those it does not have yet appended. Of a policy folder: none.",
 )
 
 
@@ -134,10 +134,12 @@ def choose_tasks(requested: str, known: tuple[str, ...]) -> tuple[str, ...]:
 def _output() -> pathlib.Path | None:
   """The file the rows go to; None: only the table is printed."""
   if not _OUTPUT.value:
-    # Whoever evaluates a stored policy again does not change its folder.
+    if not _RUN.value:
+      return None
     run = RunFolder(pathlib.Path(_RUN.value))
+    # Whoever evaluates a stored policy again does not change its folder.
     keeps = run.is_run or run.evaluation.exists() or run.checkpoints.exists()
-    return run.evaluation if _RUN.value and keeps else None
+    return run.evaluation if keeps else None
   path = pathlib.Path(_OUTPUT.value) / _NAME
   if path.exists():
     raise UserError(f"{path} exists; choose another --output")

@@ -28,12 +28,13 @@ class Index:
 
   def recall(self, jobs: Sequence[Job]) -> None:
     """Takes over what an earlier sweep knew, and finds what is done."""
-    done, wall_s = self.done(), {r["name"]: r["wall_s"] for r in self._rows()}
+    earlier = {row["name"]: row for row in self._rows()}
     for job in jobs:
-      job.wall_s = float(wall_s.get(job.name) or job.wall_s)
+      row = earlier.get(job.name, {"wall_s": "", "state": ""})
+      job.wall_s = float(row["wall_s"] or job.wall_s)
       if not _is_there(job.folder) or job.wants_more_steps():
         continue
-      if job.name in done or progress.is_done(job.folder):
+      if row["state"] == DONE or progress.is_done(job.folder):
         job.state = DONE
 
   def write(self, jobs: Sequence[Job]) -> None:

@@ -85,7 +85,8 @@ class Run:
     Returns whether there was a checkpoint.
 
     Raises:
-      CheckpointError: there are checkpoints, all damaged; nothing was changed.
+      CheckpointError: there are checkpoints, all damaged, or of another
+        version; nothing was changed.
     """
     folder = self._folder
     path = checkpoints.latest(folder.checkpoints)
@@ -98,7 +99,12 @@ class Run:
       logging.warning("%s has no checkpoint yet: starting anew", folder.path)
     else:
       state = checkpoints.load(path)
-      self.agent.load_state_dict(state["agent"])
+      try:
+        self.agent.load_state_dict(state["agent"])
+      except KeyError as error:
+        raise checkpoints.CheckpointError(
+          f"{path} is of another version: it has no {error}"
+        ) from None
       self._progress = Progress(**state["progress"])
       # Its end may be later than it was.
       self._progress.is_complete = (

@@ -188,6 +188,16 @@ class ResumingTest(fixtures.FolderTest):
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
 
+  def test_a_checkpoint_of_another_version_is_named(self):
+    path = self._killed(250)
+    older = mock.patch.object(_Agent, "load_state_dict")
+    with (
+      older as load,
+      self.assertRaisesRegex(ValueError, "version: it has no 'exp_avg'"),
+    ):
+      load.side_effect = KeyError("exp_avg")
+      self._run(path, resume=True)
+
   def test_a_run_of_damaged_checkpoints_alone_is_left_as_it_is(self):
     path = self._killed(250)
     for checkpoint in checkpoints.every(path / "checkpoints"):
