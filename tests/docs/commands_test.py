@@ -125,12 +125,17 @@ class PathsTest(parameterized.TestCase):
       path = (pages.ROOT / page).parent / name
       self.assertTrue(path.exists(), name)
 
-  def test_the_readmes_pictures_are_small(self):
-    text = (pages.ROOT / "README.md").read_text()
-    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", text)
+  def test_pictures_are_small(self):
+    pictures = {
+      (pages.ROOT / page).parent / name
+      for page in _PAGES
+      for name in re.findall(
+        r"!\[[^]]*\]\(([^)]+)\)", (pages.ROOT / page).read_text()
+      )
+    }
     self.assertGreater(len(pictures), 10)
-    for name in pictures:
-      self.assertBetween((pages.ROOT / name).stat().st_size, 1, _MOST, name)
+    for path in pictures:
+      self.assertBetween(path.stat().st_size, 1, _MOST, path)
 
 
 if __name__ == "__main__":
