@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pydantic
 
+from lfgp_dmc import finite
 from lfgp_dmc.agents import fields, vision
 from lfgp_dmc.agents import policy_options as names
 from lfgp_dmc.agents.policy_options import PolicyOptions
@@ -120,10 +121,17 @@ class Policy:
     """Writes a policy folder, each file whole or not at all.
 
     `config` is what else `config.json` holds, such as the run's config.
+
+    Raises:
+      NotFiniteError: its arrays hold NaN, as after learning that diverged;
+        what the folder held stays.
     """
+    arrays = self.arrays()
+    if not all(map(finite.is_finite, arrays.values())):
+      raise finite.fault(f"the policy of step {env_step}", arrays)
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    array_files.write(folder / ARRAYS_NAME, self.arrays())
+    array_files.write(folder / ARRAYS_NAME, arrays)
     options = {**self.options(), "env_step": env_step}
     files.write_json(
       folder / CONFIG_NAME, {**(config or {}), POLICY_FIELD: options}

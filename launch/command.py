@@ -15,6 +15,7 @@ from absl import logging as absl_logging
 
 from lfgp_dmc import graphics, signals, threads
 from lfgp_dmc.acting.workers import LostWorkerError
+from lfgp_dmc.finite import NotFiniteError
 
 _T = TypeVar("_T", str, int)
 
@@ -117,7 +118,7 @@ def guarded(main: Callable[[], int | None]) -> int | None:
     return _fail(str(error))
   except BrokenPipeError:  # such as `| head`
     return 1
-  except OSError as error:
+  except (OSError, NotFiniteError) as error:
     return _fail(str(error))
   except LostWorkerError as error:
     is_own = "workers" in flags.FLAGS

@@ -5,8 +5,11 @@ from collections.abc import Callable, Iterator
 import dm_env
 import numpy as np
 
+from lfgp_dmc import finite
 from lfgp_dmc.acting import environments
 from lfgp_dmc.types import Step, Transition
+
+_WHERE = "the environment's observation at step {} of its episode"
 
 
 def steps(
@@ -23,12 +26,22 @@ def steps(
     environment: to play in.
     first: where it is now, such as the time step of its reset.
     choose_action: observation, float32 [O] -> action, float32 [A].
+
+  Raises:
+    NotFiniteError: the environment observed NaN or infinity, other than in a
+      physics failure.
   """
   flatten = environments.flattener(environment)
-  timestep, observation = first, flatten(first.observation)
+  timestep, observation, number = first, flatten(first.observation), 0
+  if not finite.is_finite(observation):
+    raise finite.fault(_WHERE.format(number), first.observation)
   while not timestep.last():
     action = choose_action(observation)
     timestep = environment.step(action)
+    number += 1
     reached = flatten(timestep.observation)
+    failed = environments.is_physics_failure(timestep)
+    if not failed and not finite.is_finite(reached):
+      raise finite.fault(_WHERE.format(number), timestep.observation)
     yield Step(Transition(observation, action, reached), timestep)
     observation = reached

@@ -14,7 +14,7 @@ import dm_env
 import numpy as np
 from absl import logging
 
-from lfgp_dmc import seeding
+from lfgp_dmc import finite, seeding
 from lfgp_dmc.acting import environments, rollout
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs.metrics import MetricsLog
@@ -107,6 +107,9 @@ class EpisodeRounds(Rounds[ActingAgent]):
     """Adds a step to the replay; returns its rewards, float32 [R]."""
     tasks = self._replay.reward_tasks
     rewards = environments.task_rewards(step.timestep, tasks)
+    if not finite.is_finite(rewards):
+      where = f"the reward of environment step {self.progress.env_step}"
+      raise finite.fault(where, dict(zip(tasks, rewards, strict=True)))
     self._replay.add(step.transition, rewards)
     return rewards
 

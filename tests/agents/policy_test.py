@@ -11,6 +11,7 @@ from lfgp_dmc.agents.network_policy import NetworkPolicy
 from lfgp_dmc.agents.networks import layouts
 from lfgp_dmc.agents.networks.trunk import Standardiser
 from lfgp_dmc.agents.policy import Policy
+from lfgp_dmc.finite import NotFiniteError
 from tests.fixtures import FolderTest
 
 TASKS = ("main", "first")
@@ -139,6 +140,19 @@ class StoredTest(FolderTest):
     np.testing.assert_array_equal(loaded.act(rows, "first"), acts)
     config = json.loads((self.folder / "config.json").read_text())
     self.assertEqual(config["seed"], 7)
+
+  def test_one_that_diverged_does_not_replace_the_last_good_one(self):
+    _policy().save(self.folder)
+    before = [path.read_bytes() for path in sorted(self.folder.iterdir())]
+    network = _network()
+    with torch.no_grad():
+      network.heads.output.bias[0] = torch.nan
+    with self.assertRaisesRegex(
+      NotFiniteError, "policy of step 40 has NaN .* in heads.output.bias"
+    ):
+      NetworkPolicy(network, TASKS).save(self.folder, env_step=40)
+    after = [path.read_bytes() for path in sorted(self.folder.iterdir())]
+    self.assertEqual(after, before)
 
   def test_missing_and_damaged_files_are_named(self):
     _policy().save(self.folder)

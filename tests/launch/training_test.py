@@ -14,6 +14,7 @@ from lfgp_dmc import toy
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.agents import cloning
 from lfgp_dmc.data import demonstrations, evaluation_csv
+from lfgp_dmc.finite import NotFiniteError
 from lfgp_dmc.launch import assemble, torch_setup
 from lfgp_dmc.launch.command import UserError
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
@@ -98,6 +99,31 @@ class TrainingTest(fixtures.RunTest):
   def _stop(self, *arguments):
     signal.raise_signal(signal.SIGTERM)
     self.fail("it went on")
+
+  @parameterized.parameters("position", "reward/left")
+  def test_nan_ends_the_run_and_it_goes_on_from_before(self, name):
+    keeps_rewards = {
+      "algorithm": "sacx",
+      "demonstrations": "",
+      "agent.scheduler.kind": "uniform",
+    }
+    config = self.config(**keeps_rewards)
+    whole, _ = self.train(config, "whole")
+    real, calls = toy.PointEnvironment._observe, []
+
+    def observe(self):
+      calls.append(real(self))
+      if len(calls) >= 200:  # in training
+        calls[-1][name] *= np.nan
+      return calls[-1]
+
+    with (
+      mock.patch.object(toy.PointEnvironment, "_observe", observe),
+      self.assertRaisesRegex(NotFiniteError, "in (left|position)$"),
+    ):
+      self.train(config, "broken")
+    path, _ = self.train(config, "broken", resume=True)
+    self.assertEqual(fixtures.numbers(path), fixtures.numbers(whole))
 
   def test_a_stop_in_the_warm_start_starts_anew(self):
     config = self.config(**_WARM_START)

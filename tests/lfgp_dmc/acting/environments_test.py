@@ -5,7 +5,8 @@ from absl.testing import absltest, parameterized
 from dm_env import specs
 
 from lfgp_dmc import observations, toy
-from lfgp_dmc.acting import environments, wrappers
+from lfgp_dmc.acting import environments, rollout, wrappers
+from lfgp_dmc.finite import NotFiniteError
 
 
 class _Foreign(toy.PointEnvironment):
@@ -85,6 +86,43 @@ class _Cameras(toy.PointEnvironment):
     frames = {f"camera/{k}": np.full((4, 4, 3), n, np.uint8)
               for k, n in (("b", 2), ("a", 1))}  # fmt: skip
     return {**frames, **super()._observe()}
+
+
+class _Broken(toy.PointEnvironment):
+  """Loses its position in the third step, as of a sensor's fault."""
+
+  def __init__(self, value, fail_every=0):
+    super().__init__(fail_every=fail_every)
+    self._value = value
+
+  def _observe(self):
+    seen = super()._observe()
+    if self._steps == 3 or (self._fail_every and self._steps >= 10):
+      seen["position"] = np.array([0, self._value])
+    return seen
+
+
+class NotFiniteTest(parameterized.TestCase):
+  def _play(self, environment):
+    return list(
+      rollout.steps(environment, environment.reset(), lambda _: np.zeros(2))
+    )
+
+  @parameterized.parameters(np.nan, np.inf, 1e300)  # the last one as float32
+  def test_is_refused_with_the_step_and_the_name(self, value):
+    with self.assertRaisesRegex(
+      NotFiniteError, "at step 3 of its episode has NaN or .* in position"
+    ):
+      self._play(_Broken(value))
+
+  def test_a_physics_failure_may_end_in_it(self):
+    class Failing(_Broken):
+      def _observe(self):
+        self._value = np.nan if self._steps >= 10 else 0.0
+        return super()._observe()
+
+    *_, last = self._play(Failing(0.0, fail_every=1))
+    self.assertTrue(environments.is_physics_failure(last.timestep))
 
 
 class FlattenerTest(absltest.TestCase):
