@@ -3,7 +3,7 @@
   python launch/demo.py --flagfile=launch/flags/quickstart.flags
 
 This is `make demo`. It ends, in a new folder under runs/, in a table of success
-on the same resets (untrained agent, multitask BC of the same demonstrations,
+on the same resets (untrained agent, BC of the same demonstrations and tasks,
 trained agent, a stored policy trained for longer, the expert), a learning
 curve, and a video whose last clip is of the stored policy.
 """
@@ -17,12 +17,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 from absl import flags
 
-from lfgp_dmc import graphics, task_names
+from lfgp_dmc import graphics
 from lfgp_dmc.acting import evaluation
 from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.launch import command, config_flags, demo_video, policies
-from lfgp_dmc.launch.configs import RunConfig
+from lfgp_dmc.launch.configs import ALGORITHMS, RunConfig
 from lfgp_dmc.runs import run_folder
 from lfgp_dmc.runs.run_folder import RunFolder
 
@@ -36,12 +36,11 @@ _STORED = flags.DEFINE_string(
   "there.",
 )
 _BC_UPDATES = flags.DEFINE_integer(
-  "bc_updates", 3000, "Of multitask BC, which is shown beside it.", 1
+  "bc_updates", 3000, "Of BC, which is shown beside it.", 1
 )
 _HEIGHT = flags.DEFINE_integer("height", 480, "Of the video, pixels.", 32, 4320)
 _WIDTH = flags.DEFINE_integer("width", 640, "Of the video, pixels.", 32, 7680)
 _POLICIES = pathlib.Path("results/policies")
-_BC = "multitask_bc"  # its folder in the run's
 _BC_WIDTH = 256  # as in the README's table: better than narrower networks
 
 
@@ -55,7 +54,7 @@ def main() -> int:
       path = run_folder.default_path("quickstart", config.main_task)
     runs = {path: config}
     if config.demonstrations:
-      runs[path / _BC] = _cloning(config)
+      runs[path / "bc"] = _cloning(config)
   stored = _stored_policy(config.main_task)
   from lfgp_dmc.launch import training  # loads torch: not for --help
 
@@ -109,16 +108,18 @@ def table(
 
 
 def _cloning(config: RunConfig) -> RunConfig:
-  """Multitask BC of the same demonstrations, by the same preset."""
+  """BC of the same demonstrations and tasks, by the same preset."""
+  is_multitask = ALGORITHMS[config.algorithm].is_multitask
+  algorithm = "multitask_bc" if is_multitask else "bc"
   agent = config_flags.config_of(
     f"--preset={flags.FLAGS.preset}",
-    f"--config.algorithm={_BC}",
+    f"--config.algorithm={algorithm}",
     f"--config.main_task={config.main_task}",
     f"--config.agent.networks.hidden_size={_BC_WIDTH}",
   ).agent
   return dataclasses.replace(
     config,
-    algorithm=_BC,
+    algorithm=algorithm,
     agent=agent,
     init_from="",
     transfer_from="",
@@ -139,14 +140,14 @@ def _columns(
   """The table's columns: every policy on the same resets."""
   from lfgp_dmc.launch import training
 
-  tasks = task_names.task_set(config.main_task)
+  tasks = policies.find(str(path)).tasks
   with tempfile.TemporaryDirectory() as folder:
     training.write_untrained_policy(config, pathlib.Path(folder))
     make = functools.partial(policies.stored_policy, folder)
     untrained = _evaluate(config, "the untrained agent", make, tasks)
   columns = {"untrained": untrained}
   if config.demonstrations:
-    columns["BC"] = _trained(path / _BC)
+    columns["BC"] = _trained(path / "bc")
   columns["trained"] = _trained(path)
   if stored is not None:
     able = [task for task in tasks if task in stored.tasks]

@@ -78,6 +78,21 @@ class DatasetsTest(fixtures.RunTest):
     shown = shlex.split(printed.call_args.args[0].partition(": ")[2])
     self.assertEqual(shown[2:], popen.call_args.args[0][2:])
 
+  def test_what_another_run_collected_meanwhile_is_used(self):
+    folder = self.folder / "meanwhile"
+    config = _stack(
+      folder, collect_missing=True, pairs_per_task=30, algorithm="dac"
+    )
+
+    def wait():  # until the command refuses the folder that is there by now
+      fixtures.write_dataset(folder, ["stack"], 59, 4)
+      return 1
+
+    with mock.patch.object(subprocess, "Popen") as popen:
+      popen.return_value.__enter__.return_value.wait.side_effect = wait
+      found = datasets.load(config, ["stack"], (59, 4))
+    self.assertLen(found["stack"], 30)
+
   def test_published_examples_are_read_like_a_dataset(self):
     data = pathlib.Path(__file__).parents[1] / "data"
     folder = self.folder / "examples"
