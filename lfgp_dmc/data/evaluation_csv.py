@@ -1,5 +1,6 @@
 """`evaluation.csv`, its rows, and the table of success."""
 
+import pathlib
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
@@ -33,6 +34,18 @@ class EvaluationRow(NamedTuple):
 def append_csv(path: files.Path, rows: Iterable[EvaluationRow]) -> None:
   """Appends rows, as training does after each evaluation."""
   csv_files.append(path, COLUMNS, [_as_text(row) for row in rows])
+
+
+def replace_csv(path: files.Path, rows: Sequence[EvaluationRow]) -> None:
+  """Appends rows after dropping what the file has of the same episodes.
+
+  Raises:
+    ValueError: the file is not an evaluation's CSV; the message names it.
+  """
+  found = read_csv(path) if pathlib.Path(path).exists() else []
+  episodes = {row[:4] for row in rows}
+  kept = [row for row in found if row[:4] not in episodes]
+  csv_files.write(path, COLUMNS, [_as_text(row) for row in (*kept, *rows)])
 
 
 def read_csv(path: files.Path) -> list[EvaluationRow]:

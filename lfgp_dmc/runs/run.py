@@ -122,8 +122,7 @@ class Run:
     self._save_policy(env_step)
     rows = self._evaluate_policy(env_step)
     # Rows may be there of a kill between here and the checkpoint.
-    csv_files.truncate_after(self._folder.evaluation, env_step - 1)
-    evaluation_csv.append_csv(self._folder.evaluation, rows)
+    evaluation_csv.replace_csv(self._folder.evaluation, rows)
     return evaluation_csv.success_rates(rows)
 
   def _checkpoint(self, progress: Progress) -> None:

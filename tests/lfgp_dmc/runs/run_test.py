@@ -8,6 +8,7 @@ import numpy as np
 
 from lfgp_dmc import toy
 from lfgp_dmc.acting import workers
+from lfgp_dmc.data import evaluation_csv
 from lfgp_dmc.data.evaluation_csv import EvaluationRow
 from lfgp_dmc.data.replay import Replay
 from lfgp_dmc.runs import checkpoints, run, run_folder
@@ -180,6 +181,19 @@ class ResumingTest(fixtures.FolderTest):
     self.assertLen(fixtures.rows(path / "evaluation.csv"), 1)
     self._run(path, resume=True)
     self.assertEqual(self._numbers(path), self._whole)
+
+  def test_rows_of_other_seeds_stay_when_a_due_evaluation_is_made_up_for(self):
+    path = self.folder / "killed"
+    lost = workers.LostWorkerError("killed")
+    with self.assertRaises(workers.LostWorkerError):
+      self._run(path, evaluate=mock.Mock(side_effect=lost))
+    step = int(checkpoints.every(path / "checkpoints")[-1].name)
+    of_user = EvaluationRow(step, "right", 0, 909, 1, 4, 0.5)
+    evaluation_csv.append_csv(path / "evaluation.csv", [of_user])
+    self._run(path, resume=True)
+    rows = evaluation_csv.read_csv(path / "evaluation.csv")
+    self.assertLen(rows, 5)
+    self.assertIn(of_user, rows)
 
   def test_a_damaged_newest_checkpoint_falls_back(self):
     path = self._killed(250)
