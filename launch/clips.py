@@ -58,9 +58,11 @@ def play(
 
 
 def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
-  """The run's own scheduler, as of its last checkpoint."""
-  if spec.folder is None or "agent" not in spec.config:
-    raise command.UserError("--task=scheduled needs the folder of a whole run")
+  """The run's own scheduler, as of its last checkpoint, drawing by `seed`."""
+  if spec.folder is None or "scheduler" not in spec.config.get("agent", {}):
+    raise command.UserError(
+      "--task=scheduled needs the folder of a run that has a scheduler"
+    )
   from lfgp_dmc.agents.schedulers import make_scheduler
   from lfgp_dmc.launch import configs
 
@@ -69,9 +71,11 @@ def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
     scheduler = make_scheduler(
       agent.scheduler, spec.tasks, np.random.default_rng(seed)
     )
+  own_draws = {"generator": scheduler.state_dict()["generator"]}
   path = checkpoints.latest(run_folder.RunFolder(spec.folder).checkpoints)
   if path is not None:
-    scheduler.load_state_dict(checkpoints.load(path)["agent"]["scheduler"])
+    learned = checkpoints.load(path)["agent"]["scheduler"]
+    scheduler.load_state_dict({**learned, **own_draws})
   scheduler.begin_episode()
   chosen = ""
 

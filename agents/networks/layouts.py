@@ -53,8 +53,13 @@ def make_critics(
 
   Nor do they see the `revealed` ones until `reveal`; there, in the separate
   layout, they start from weights of 0.
+
+  Raises:
+    ValueError: nothing is left to see.
   """
   selection = Selection(inputs, masked, revealed)
+  if not selection.size:
+    raise ValueError("critic.masked hides all that critics see")
   trunk = _make_trunk(layout, selection.size, hidden, generator)
   if not selection.sees_all or selection.reveals:
     trunk = nn.Sequential(selection, trunk)

@@ -67,7 +67,8 @@ class Selection(nn.Module):
   ):
     """Leaves out `masked` of so many inputs; `revealed` ones are 0 at first."""
     super().__init__()
-    seen = torch.tensor(sorted({*range(inputs)} - {*masked}))
+    left = sorted({*range(inputs)} - {*masked})
+    seen = torch.tensor(left, dtype=torch.int64)  # also if there are none
     self.register_buffer("seen", seen, persistent=False)
     self.size = len(seen)
     self.sees_all = self.size == inputs

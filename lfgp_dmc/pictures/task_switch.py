@@ -18,10 +18,13 @@ def one_task(task: str) -> Switch:
 
 
 class Play:
-  """Another random task after each success or 120 steps, without a reset."""
+  """A random task after each success or 120 steps, without a reset.
+
+  It is another one, if there are several.
+  """
 
   def __init__(self, environment: Any, tasks: Sequence[str], seed: int):
-    """Chooses the first of two or more tasks; `clear_success` is needed."""
+    """Chooses the first task; the environment must have `clear_success`."""
     self._environment, self._tasks = environment, tasks
     self._random = seeding.generator(seed, "play")
     self._task = ""
@@ -37,5 +40,6 @@ class Play:
 
   def _next(self, step: int) -> None:
     others = [task for task in self._tasks if task != self._task]
+    others = others or [*self._tasks]  # an auxiliary task stands alone
     self._task = others[self._random.integers(len(others))]
     self._since = step

@@ -225,6 +225,14 @@ class TrainingTest(fixtures.RunTest):
     ({"agent.reward.batch_size": 10**12}, "agent.reward.batch_size is 1000000"),
     ({"replay_capacity": 10**20}, "config.replay_capacity is 1000000000000000"),
     ({"agent.scheduler.kind": "weighted_random_handcrafted"}, "handcrafted"),
+    (
+      {"agent.critic.masked": "0:2", "agent.networks.actor_trunk": "own"},
+      "critic.masked hides all",
+    ),
+    (
+      {"agent.reward.masked": "0:2", "agent.reward.input": "state"},
+      "masked slices hide all",
+    ),
   )
   def test_bad_input_leaves_no_folder(self, changes, message):
     with self.assertRaisesRegex(UserError, message):
