@@ -55,12 +55,20 @@ class EnvironmentSpec:
     )
 
   def tasks(self, environment: dm_env.Environment) -> tuple[str, ...]:
-    """What LfGP learns in what was built, the main task first."""
-    if self.environment:
-      return environments.with_observed_tasks(
-        environment, (self.main_task,), SUCCESS_PREFIX
+    """What LfGP learns in what was built, the main task first.
+
+    Raises:
+      ValueError: what was built tells its tasks, and not this one.
+    """
+    if not self.environment:
+      return task_set(self.main_task)
+    told = environments.with_observed_tasks(environment, (), SUCCESS_PREFIX)
+    if told and self.main_task not in told:
+      raise ValueError(
+        f"config.main_task is {self.main_task!r}; valid for {_FIELD}="
+        f"{self.environment}: {', '.join(told)}"
       )
-    return task_set(self.main_task)
+    return tuple(dict.fromkeys((self.main_task, *told)))
 
   @property
   def may_draw(self) -> bool:

@@ -72,9 +72,13 @@ def default_path(
   parent: files.Path = "runs",
   now: datetime.datetime | None = None,
 ) -> pathlib.Path:
-  """`runs/20220131_235959_lfgp_stack`, or with `_2`, ... if that exists."""
+  """Such as `runs/20220131_235959_012345_lfgp_stack`.
+
+  The microseconds tell runs apart that start together. With `_2`, ... if it
+  exists all the same.
+  """
   now = datetime.datetime.now() if now is None else now
-  stem = f"{now:%Y%m%d_%H%M%S}_{algorithm}_{task}"
+  stem = f"{now:%Y%m%d_%H%M%S_%f}_{algorithm}_{task}"
   return files.unused(pathlib.Path(parent) / stem)
 
 

@@ -186,7 +186,10 @@ class RunFolderTest(fixtures.FolderTest):
   def test_default_path_is_new(self):
     now = datetime.datetime(2022, 1, 31, 12, 0, 5)
     first = run_folder.default_path("lfgp", "stack", self.folder, now)
-    self.assertEqual(first.name, "20220131_120005_lfgp_stack")
+    self.assertEqual(first.name, "20220131_120005_000000_lfgp_stack")
     first.mkdir()
     second = run_folder.default_path("lfgp", "stack", self.folder, now)
-    self.assertEqual(second.name, "20220131_120005_lfgp_stack_2")
+    self.assertEqual(second.name, "20220131_120005_000000_lfgp_stack_2")
+    now += datetime.timedelta(microseconds=1)
+    together = run_folder.default_path("lfgp", "stack", self.folder, now)
+    self.assertEqual(together.name, "20220131_120005_000001_lfgp_stack")
