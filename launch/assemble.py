@@ -91,7 +91,8 @@ def make_replay(
       parts.environment, parts.tasks, REWARD_PREFIX
     )
   # A full ring must still hold the rows of the last checkpoint.
-  slack = config.checkpoint_every + 2 * config.most_episode_steps
+  between = min(config.checkpoint_every, config.env_steps)
+  slack = between + 2 * config.most_episode_steps
   return Replay(
     config.replay_capacity if folder else 1,
     *parts.widths,
@@ -159,7 +160,7 @@ def make_run(
 def _schedule(config: RunConfig, progress_bar: bool) -> TrainSchedule:
   warm_up = config.warm_up
   if config.transfer_from:  # there is a replay from the start
-    warm_up = min(warm_up, config.agent.batch_size)
+    warm_up = min(warm_up, config.agent.batch_size, config.replay_capacity)
   return TrainSchedule(
     env_steps=config.env_steps,
     log_every=config.log_every,

@@ -75,7 +75,12 @@ def scheduled(spec: policies.PolicySpec, seed: int) -> recorder.Switch:
   path = checkpoints.latest(run_folder.RunFolder(spec.folder).checkpoints)
   if path is not None:
     learned = checkpoints.load(path)["agent"]["scheduler"]
-    scheduler.load_state_dict({**learned, **own_draws})
+    try:
+      scheduler.load_state_dict({**learned, **own_draws})
+    except KeyError as error:
+      raise command.UserError(
+        f"{path} is of another version: its scheduler has no {error}"
+      ) from None
   scheduler.begin_episode()
   chosen = ""
 

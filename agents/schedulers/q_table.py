@@ -8,6 +8,8 @@ import numpy as np
 from lfgp_dmc.agents.schedulers.base import Scheduler
 from lfgp_dmc.agents.schedulers.config import QTableConfig
 
+_UNKNOWN = -1  # the number of histories that never were
+
 
 class QTable(Scheduler):
   """Boltzmann choice over Q(history, task), learned by moving averages.
@@ -22,30 +24,33 @@ class QTable(Scheduler):
     super().__init__(generator)
     self._tasks, self._config = tasks, config
     self.temperature = config.temperature
-    # History ending in the task chosen -> value; what is missing is 0.
-    self._table: dict[tuple[int, ...], float] = {}
-    self._history: tuple[int, ...] = ()
+    # Histories are numbered: 0 is empty, and each is an earlier one (their
+    # number, the task chosen next) and has the Q of its last choice. So the
+    # table grows by the new choices alone, not by whole histories.
+    self._numbers: dict[tuple[int, int], int] = {}
+    self._values = [0.0]
+    self._history: list[int] = []
 
   def value(self, choices: Sequence[int]) -> float:
-    """Q of the last of `choices` after the ones before it."""
-    return self._table.get(tuple(choices), 0.0)
+    """Q of the last of `choices` after the ones before it; at first 0."""
+    return self._value(self._number(choices))
 
   def begin_episode(self) -> None:
     """Empties the history."""
-    self._history = ()
+    self._history = []
 
   def probabilities(self) -> np.ndarray:
     """softmax(Q(history, .) / temperature), float64 [K]."""
-    values = np.array(
-      [self.value((*self._history, task)) for task in range(self._tasks)]
-    )
+    number = self._number(self._history)
+    longer = (self._longer(number, task) for task in range(self._tasks))
+    values = np.array([self._value(each) for each in longer])
     weights = np.exp((values - values.max()) / self.temperature)
     return weights / weights.sum()
 
   def next_task(self) -> int:
     """Draws a task, then cools down."""
     task = super().next_task()
-    self._history = (*self._history, task)
+    self._history.append(task)
     cooler = self.temperature * self._config.decay
     self.temperature = max(cooler, self._config.minimum)
     return task
@@ -60,30 +65,42 @@ class QTable(Scheduler):
       raise ValueError(
         f"{len(main_returns)} returns for {len(self._history)} choices"
       )
-    phi = self._config.phi
-    for period, main_return in enumerate(main_returns):
-      prefix = self._history[: period + 1]
-      self._table[prefix] = (1 - phi) * self.value(prefix) + phi * main_return
+    phi, number = self._config.phi, 0
+    for task, main_return in zip(self._history, main_returns, strict=True):
+      longer = self._numbers.setdefault((number, task), len(self._values))
+      if longer == len(self._values):
+        self._values.append(0.0)
+      number = longer
+      self._values[number] *= 1 - phi
+      self._values[number] += phi * main_return
 
   def state_dict(self) -> dict[str, Any]:
-    """Histories int64 [n, longest], padded by -1, values [n], temperature."""
-    longest = max(map(len, self._table), default=0)
-    histories = np.full((len(self._table), longest), -1, np.int64)
-    for row, history in enumerate(self._table):
-      histories[row, : len(history)] = history
+    """Rows of the table: int64 [n, 2] and their Q [n]; the temperature."""
     return super().state_dict() | {
-      "histories": histories,
-      "values": np.array(list(self._table.values()), np.float64),
+      "choices": np.array([*self._numbers], np.int64).reshape(-1, 2),
+      "values": np.array(self._values[1:], np.float64),
       "temperature": float(self.temperature),
     }
 
   def load_state_dict(self, state: Mapping[str, Any]) -> None:
     """Restores what `state_dict` returned."""
     super().load_state_dict(state)
-    rows = zip(state["histories"], state["values"], strict=True)
-    self._table = {
-      tuple(int(task) for task in history if task >= 0): float(value)
-      for history, value in rows
-    }
+    known = state["choices"].tolist()
+    self._numbers = {tuple(row): n for n, row in enumerate(known, 1)}
+    self._values = [0.0, *state["values"].tolist()]
     self.temperature = float(state["temperature"])
-    self._history = ()
+    self._history = []
+
+  def _number(self, choices: Sequence[int]) -> int:
+    """Of a history."""
+    number = 0
+    for task in choices:
+      number = self._longer(number, task)
+    return number
+
+  def _longer(self, number: int, task: int) -> int:
+    """The number of a history and one more choice."""
+    return self._numbers.get((number, task), _UNKNOWN)
+
+  def _value(self, number: int) -> float:
+    return 0.0 if number == _UNKNOWN else self._values[number]

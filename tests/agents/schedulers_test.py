@@ -104,6 +104,26 @@ class QTableTest(absltest.TestCase):
     self.assertEqual([other.value([0]), other.value([0, 1])], [5.0, 10.0])
     self.assertEqual(other.value([1]), 0.0)
 
+  def test_equals_a_table_of_whole_histories(self):
+    random, expected = np.random.default_rng(1), {}
+    choices = random.integers(3, size=(40, 4))
+    table = _table(3, _Scripted(choices.ravel()), phi=0.3)
+    for row in choices.tolist():
+      returns = random.normal(size=4)
+      self._play(table, returns)
+      for length, main_return in enumerate(returns, 1):
+        history = tuple(row[:length])
+        before = expected.get(history, 0.0)
+        expected[history] = (1 - 0.3) * before + 0.3 * main_return
+    restored = _table(3, np.random.default_rng(0))
+    table._generator.bit_generator = restored._generator.bit_generator
+    state = fixtures.reloaded(table.state_dict())
+    restored.load_state_dict(state)
+    self.assertLen(state["values"], len(expected))
+    for history, value in expected.items():
+      self.assertAlmostEqual(table.value(history), value)
+      self.assertEqual(restored.value(history), table.value(history))
+
   def test_returns_must_match_the_choices(self):
     table = _table(2, np.random.default_rng(0))
     table.begin_episode()

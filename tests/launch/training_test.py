@@ -187,6 +187,11 @@ class TrainingTest(fixtures.RunTest):
     config = self.config(env_steps=120, replay_capacity=60)
     self.assertTrue(self.train(config, resume=True)[1].is_complete)
 
+  def test_rare_checkpoints_do_not_enlarge_the_replay(self):
+    path, _ = self.train(self.config(env_steps=40, checkpoint_every=10**9))
+    size = (path / "replay" / "observation.npy").stat().st_size
+    self.assertLess(size, 10_000)
+
   def test_other_demonstrations_are_not_resumed(self):
     self.train(self.config(env_steps=40))
     shutil.rmtree(self.dataset)

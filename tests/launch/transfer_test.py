@@ -140,6 +140,11 @@ class TransferTest(_RunTest):
     self.assertEqual(state["agent"]["learner"]["updates"], 107)
     self.assertEqual(state["replay_total"], 200)
 
+  def test_learns_with_a_replay_that_holds_less_than_a_batch(self):
+    source, _ = self.train(self.config(), "source")
+    _, progress = self.train(self._to(source, replay_capacity=5), "new")
+    self.assertEqual(progress.update, 100)
+
   def test_rewards_of_a_new_task_come_from_the_old_replay(self):
     """SAC-X stored the reward of "left", which becomes a task only later."""
     config = self.config("sacx", **{"env_steps": 60})
