@@ -55,7 +55,7 @@ _EXPERT = flags.DEFINE_string(
   "expert", "scripted", "scripted, or the folder of a run or policy."
 )
 _WORKERS = flags.DEFINE_integer(
-  "workers", 0, "Processes; 0: one a core. The data are the same.", 0
+  "workers", 0, "Processes; 0: one a core. The data are the same.", 0, 4096
 )
 
 _HERTZ = flags.DEFINE_integer(

@@ -42,7 +42,9 @@ _SEED = flags.DEFINE_integer("seed", 0, "Of the resets.", 0)
 _CHECKPOINTS = flags.DEFINE_integer(
   "checkpoints", 0, "With --run: so many of its last checkpoints; see above.", 0
 )
-_WORKERS = flags.DEFINE_integer("workers", 0, "Processes; 0: one a core.", 0)
+_WORKERS = flags.DEFINE_integer(
+  "workers", 0, "Processes; 0: one a core.", 0, 4096
+)
 _MAIN_TASK = flags.DEFINE_enum(
   "main_task",
   None,

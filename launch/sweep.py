@@ -78,8 +78,9 @@ def main() -> int:
       print(f"{job.state:<12} {job.name:<32} {arguments}")
     print(_summary(todo))
     return 0
-  if all(job.state == jobs.MISSING for job in todo):
-    raise UserError("none of these runs has a flagfile; see --dry_run")
+  if missing := [j for j in todo if j.state == jobs.MISSING]:
+    names = dict.fromkeys(str(job.flagfile) for job in missing)
+    raise UserError(f"no flagfile {', '.join(names)}; see --dry_run")
   runs.mkdir(parents=True, exist_ok=True)
   engine: engines.Engine
   if _RAY_ADDRESS.value:
@@ -90,8 +91,7 @@ def main() -> int:
   print(f"{_summary(todo)}\n{index.path}")
   if was_stopped:
     return command.INTERRUPTED
-  ok = (jobs.DONE, jobs.MISSING)
-  return int(any(job.state not in ok for job in todo))
+  return int(any(job.state != jobs.DONE for job in todo))
 
 
 def _jobs(runs: pathlib.Path) -> list[Job]:

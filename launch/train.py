@@ -69,6 +69,10 @@ def report(
   unit = "updates" if is_supervised else "environment steps"
   print(f"\nsuccess after {progress.env_step} {unit}:")
   print(evaluation_csv.success_table(evaluation_csv.newest(rows)))
+  if not progress.update:
+    print(
+      f"\nnothing was learned: config.warm_up={config.warm_up} left no step"
+    )
   print(f"\nmetrics      {folder.metrics} (and TensorBoard beside it)")
   print(f"evaluation   {folder.evaluation}")
   print(f"policy       {path / run_folder.ARRAYS_NAME}")

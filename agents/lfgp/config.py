@@ -201,6 +201,16 @@ class LfgpConfig:
           "leaves rows for the intentions, unless "
           "reward.intentions_on_experts is True"
         )
+      if reward.expert_share and not experts:
+        yield (
+          f"reward.expert_share is {reward.expert_share!r}; valid: 0, or what "
+          f"makes a row of batch_size, {self.batch_size}"
+        )
+      if reward.main_expert_share and not reward.expert_share:
+        yield (
+          f"reward.main_expert_share is {reward.main_expert_share!r}; valid: 0 "
+          "without reward.expert_share"
+        )
       if reward.final_share and int(reward.final_share * reward.batch_size) < 1:
         yield (
           f"reward.final_share is {reward.final_share!r}; valid: 0, or what "

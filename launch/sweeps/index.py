@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from lfgp_dmc.data import csv_files
 from lfgp_dmc.launch.sweeps import progress
-from lfgp_dmc.launch.sweeps.jobs import DONE, Job
+from lfgp_dmc.launch.sweeps.jobs import DONE, FAILED, Job
 from lfgp_dmc.runs import run_folder
 
 COLUMNS = ("name", "algorithm", "main_task", "seed", "state", "attempts",
@@ -38,10 +38,18 @@ class Index:
         job.state = DONE
 
   def write(self, jobs: Sequence[Job]) -> None:
-    """Writes a row a run, whole or not at all; other sweeps' rows stay."""
-    own = {job.name for job in jobs}
-    rows: list[dict] = [r for r in self._rows() if r["name"] not in own]
+    """Writes a row a run, whole or not at all; other sweeps' rows stay.
+
+    So does what another sweep did while the run failed here, as it must if both
+    start it.
+    """
+    known = self._rows()
+    done = {row["name"] for row in known if row["state"] == DONE}
+    own = {j.name for j in jobs if j.state != FAILED or j.name not in done}
+    rows: list[dict] = [row for row in known if row["name"] not in own]
     for job in jobs:
+      if job.name not in own:
+        continue
       step, success = progress.last_success(job.folder)
       found = {
         "env_step": step,

@@ -54,9 +54,10 @@ def ordered(
   waiting = concurrent.futures.ThreadPoolExecutor(workers)  # each for one
   try:
     resource_tracker.ensure_running()  # its start lets signals through again
-    with signals.held(), _variables(draws):
+    with _variables(draws):
       for _ in range(workers):
-        crew.append(_Worker(make_state))
+        with signals.held():  # one at a time: many take minutes to start
+          crew.append(_Worker(make_state))
     idle = collections.deque(crew)
 
     def do(job: Any) -> Any:

@@ -178,6 +178,14 @@ class ConfigTest(parameterized.TestCase):
       "config.agent.prior.weight is 5.0; valid: 0 without",
     ),
     (
+      "--config.agent.reward.expert_share=0.001",
+      "config.agent.reward.expert_share is 0.001; valid: 0, or what makes",
+    ),
+    (
+      "--config.agent.reward.main_expert_share=0.5",
+      "config.agent.reward.main_expert_share is 0.5; valid: 0 without",
+    ),
+    (
       "--config.algorithm=bc --config.transfer_from=runs/x",
       "config.transfer_from is 'runs/x'; valid: nothing with bc, which keeps",
     ),

@@ -28,7 +28,10 @@ class SweepCommandTest(FolderTest):
     listed = self._call("--algorithms=lfgp,dac", "--dry_run")
     self.assertIn("2 runs: 1 waiting, 1 no flagfile", listed.stdout)
     self.assertFalse((self.folder / "runs").exists())
-    running = self._start("--algorithms=lfgp,dac")
+    refused = self._call("--algorithms=lfgp,dac")
+    self.assertEqual(refused.returncode, 1)
+    self.assertIn("flags/dac.flags; see --dry_run", refused.stderr)
+    running = self._start()
     run = self.folder / "runs" / "lfgp_right_0"
     log = run.with_name("lfgp_right_0.log")
     sweep_fixtures.wait_for((run / "metrics.csv").exists)

@@ -113,6 +113,15 @@ class SweepTest(FolderTest):
     self.assertEqual(by_name["lfgp_stack_1"]["message"],
                      "killed by SIGKILL")  # fmt: skip
 
+  def test_what_another_sweep_finished_meanwhile_stays_done(self):
+    here, there = (self._jobs(("lfgp_move_object",)) for _ in range(2))
+    there[0].state, there[0].attempts = "done", 3
+    Index(self.folder).write(there)
+    here[0].state = "failed"
+    Index(self.folder).write(here)
+    _, (row,) = csv_files.read(self.folder / "index.csv")
+    self.assertEqual((row["state"], row["attempts"]), ("done", "3"))
+
   def test_a_lock_not_released_yet_is_tried_again_after_a_rest(self):
     jobs = self._jobs(("lfgp_move_object",))
     engine = FakeEngine({"lfgp_move_object_0": [-9, 1, 0]})

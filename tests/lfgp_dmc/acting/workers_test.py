@@ -43,6 +43,25 @@ class WorkersTest(absltest.TestCase):
     self.assertEmpty(multiprocessing.active_children())
     super().tearDown()
 
+  def test_a_signal_ends_the_start_of_many(self):
+    class Started:
+      def __init__(self, _):
+        crew.append(self)
+        self.is_killed = False
+        if len(crew) == 2:
+          signal.raise_signal(signal.SIGINT)
+
+      def kill(self):
+        self.is_killed = True
+
+    crew: list[Started] = []
+    with (
+      mock.patch.object(workers, "_Worker", Started),
+      self.assertRaises(KeyboardInterrupt),
+    ):
+      next(workers.ordered(_Player, iter(range(40)), 9))
+    self.assertEqual([each.is_killed for each in crew], [True, True])
+
   def test_results_come_in_order_whatever_signals_all_processes_get(self):
     real = workers._Worker.do
 

@@ -120,11 +120,20 @@ class AttemptsTest(FolderTest):
     (("bc,stack,10,0,,high,,",), "a.csv, line 2: could not convert .*'high'"),
     (("bc,stack,10,0,,44,,",), "line 2: success is 44; valid: 0 to 1"),
     (("bc,stack,few,0,,0.4,,",), "line 2: invalid literal .*'few'"),
+    (("bc,stack,0,0,,0.4,,",), "line 2: attempts is 0; valid: 1 or more"),
+    (("bc,all,5,0,,0.4,,",), "line 2: main_task is all; valid: a task"),
+    (("bc, stack,5,0,,0.4,,", "bc,stack,5,0,,0.5,,"), "seed 0 .* there twice"),
     (("bc,stack,5,0,,0.4,,",) * 2, "line 3: seed 0 of bc is there twice"),
   )
   def test_damaged_rows_are_told(self, rows, message):
     with self.assertRaisesRegex(ValueError, message):
       self._read(*rows)
+
+  @parameterized.parameters("0", "-5", "0.5", "inf")
+  def test_numbers_of_episodes_that_are_none_are_told(self, episodes):
+    header, row = f"{_HEADER},episodes", f"bc,stack,5,0,,0.4,,,{episodes}"
+    with self.assertRaisesRegex(ValueError, "line 2: episodes is .*; valid: 1"):
+      self._read(row, header=header)
 
   def test_missing_columns_are_told(self):
     with self.assertRaisesRegex(ValueError, "has no column attempts, seed"):
