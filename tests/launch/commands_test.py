@@ -45,6 +45,21 @@ class DemoTest(FolderTest):
       self.assertTrue((self.folder / "runs/demo/video.mp4").exists())
 
 
+class ShortRunTest(FolderTest):
+  def test_says_that_no_update_was_made(self):
+    fixtures.write_dataset(self.folder / "data")
+    done = fixtures.call(
+      "train.py --config.algorithm=lfgp --config.demonstrations=data "
+      f"--config.environment={fixtures.POINT} --config.main_task=right "
+      "--config.agent.networks.hidden_size=16 --config.episode_steps=20 "
+      "--config.env_steps=40 --config.warm_up=50 --config.replay_capacity=200 "
+      "--config.evaluation_episodes=1 --config.evaluation_workers=1 --run=a",
+      self.folder,
+    )
+    self.assertEqual(done.returncode, 0, done.stderr)
+    self.assertIn("nothing was learned: config.warm_up=50", done.stdout)
+
+
 class BlockRunTest(absltest.TestCase):
   """A tiny run of the block tasks, made once, and what is done with it."""
 

@@ -91,6 +91,7 @@ class SignalsTest(shared.FolderTest):
     done = fixtures.call("train.py --run=a --resume", self.folder)
     self.assertEqual(done.returncode, 0, done.stderr)
     self.assertIn("success after 40", done.stdout)
+    self.assertNotIn("nothing was learned", done.stdout)
 
   def test_a_lost_worker_is_a_line_with_the_flag(self):
     def lose():
