@@ -55,6 +55,9 @@ class WorkersTest(absltest.TestCase):
         self.is_killed = True
 
     crew: list[Started] = []
+    # In the background of a shell it would be ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    self.addCleanup(signal.signal, signal.SIGINT, before)
     with (
       mock.patch.object(workers, "_Worker", Started),
       self.assertRaises(KeyboardInterrupt),
