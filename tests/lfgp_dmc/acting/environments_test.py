@@ -110,8 +110,11 @@ class NotFiniteTest(parameterized.TestCase):
 
   @parameterized.parameters(np.nan, np.inf, 1e300)  # the last one as float32
   def test_is_refused_with_the_step_and_the_name(self, value):
-    with np.errstate(over="ignore"), self.assertRaisesRegex(
-      NotFiniteError, "at step 3 of its episode has NaN or .* in position"
+    with (
+      np.errstate(over="ignore"),
+      self.assertRaisesRegex(
+        NotFiniteError, "at step 3 of its episode has NaN or .* in position"
+      ),
     ):
       self._play(_Broken(value))
 
