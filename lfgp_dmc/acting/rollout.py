@@ -9,8 +9,6 @@ from lfgp_dmc import finite
 from lfgp_dmc.acting import environments
 from lfgp_dmc.types import Step, Transition
 
-_WHERE = "the environment's observation at step {} of its episode"
-
 
 def steps(
   environment: dm_env.Environment,
@@ -32,16 +30,20 @@ def steps(
       physics failure.
   """
   flatten = environments.flattener(environment)
-  timestep, observation, number = first, flatten(first.observation), 0
-  if not finite.is_finite(observation):
-    raise finite.fault(_WHERE.format(number), first.observation)
+  taken = 0
+
+  def read(timestep: dm_env.TimeStep) -> np.ndarray:
+    flat = flatten(timestep.observation)
+    if finite.is_finite(flat) or environments.is_physics_failure(timestep):
+      return flat
+    where = f"the environment's observation at step {taken} of its episode"
+    raise finite.fault(where, timestep.observation)
+
+  timestep, observation = first, read(first)
   while not timestep.last():
     action = choose_action(observation)
     timestep = environment.step(action)
-    number += 1
-    reached = flatten(timestep.observation)
-    failed = environments.is_physics_failure(timestep)
-    if not failed and not finite.is_finite(reached):
-      raise finite.fault(_WHERE.format(number), timestep.observation)
+    taken += 1
+    reached = read(timestep)
     yield Step(Transition(observation, action, reached), timestep)
     observation = reached

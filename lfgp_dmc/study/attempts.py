@@ -68,18 +68,18 @@ def read(path: files.Path) -> Results:
       episodes, hours = (
         float(row.get(name) or "nan") for name in ("episodes", "core_hours")
       )
+      attempts, task = int(row["attempts"]), row["main_task"].strip()
+      if attempts < 1:
+        raise ValueError(f"attempts is {attempts}; valid: 1 or more")
+      if task == ALL:
+        raise ValueError(f"main_task is {ALL}; valid: a task")
+      is_told = not np.isnan(episodes)
+      if is_told and not (episodes >= 1 and episodes % 1 == 0):
+        raise ValueError(f"episodes is {episodes}; valid: 1 or more")
       for method, success in found.items():
-        attempts, task = int(row["attempts"]), row["main_task"].strip()
-        if attempts < 1:
-          raise ValueError(f"attempts is {attempts}; valid: 1 or more")
-        if task == ALL:
-          raise ValueError(f"main_task is {ALL}; valid: a task")
         seeds = results[method.strip(), attempts, task]
         if seed in seeds:
           raise ValueError(f"seed {seed} of {method} is there twice")
-        is_told = not np.isnan(episodes)
-        if is_told and not (episodes >= 1 and episodes % 1 == 0):
-          raise ValueError(f"episodes is {episodes}; valid: 1 or more")
         if not 0 <= float(success) <= 1:
           raise ValueError(f"success is {success}; valid: 0 to 1")
         seeds[seed] = Result(float(success), episodes, hours)
