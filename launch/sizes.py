@@ -21,7 +21,11 @@ def check(config: configs.RunConfig, folder: files.Path) -> None:
   outputs, each transition three numbers at least, on the disk of `folder`.
   """
   disk = shutil.disk_usage(files.existing_parent(folder)).total
-  width, rows = config.agent.networks.hidden_size, config.replay_capacity
+  fields = dict(configs.flattened(config.to_dict()))
+  width, rows = (
+    fields.get("agent.networks.hidden_size", 1),
+    config.replay_capacity,
+  )
   of_algorithm = configs.ALGORITHMS[config.algorithm]
   tasks = 1
   if of_algorithm.is_multitask and not config.environment:
@@ -30,7 +34,7 @@ def check(config: configs.RunConfig, folder: files.Path) -> None:
   squares = tasks * (4 if of_algorithm.is_supervised else 14)
   refuse("agent.networks.hidden_size", width, squares * width**2)
   refuse("replay_capacity", rows, 3 * rows, disk)
-  for name, value in configs.flattened(config.to_dict()):
+  for name, value in fields.items():
     if name.endswith("batch_size"):
       refuse(name, value, 2 * tasks * value * width)
 

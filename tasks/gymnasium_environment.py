@@ -10,6 +10,8 @@ Episodes are truncated at their time limit and never terminate: success does not
 end them. After `reset(seed=...)` everything depends on the seed alone.
 """
 
+import inspect
+from collections.abc import Iterable
 from typing import Any
 
 import gymnasium
@@ -49,15 +51,16 @@ class BlockEnvironment(DmControlCompatibilityV0):
     height, width and camera_id of pictures. Raises ValueError if an option is
     wrong, or pictures are wanted where none can be made.
     """
+    _check("render_mode", [render_mode], [None, *self.metadata["render_modes"]])
+    _check("render_kwargs", render_kwargs or (), _FIXED_RENDERING)
     if render_mode and (fault := graphics.fault()):
       raise ValueError(fault)
     self.task_name, self._is_closed = task, False
     self.metadata = dict(self.metadata)  # shimmy writes into it
-    super().__init__(
-      lfgp_dmc.load(task, **options),
-      render_mode,
-      {**_FIXED_RENDERING, **(render_kwargs or {})},
-    )
+    env = lfgp_dmc.load(task, **options)
+    rendering = {**_FIXED_RENDERING, **(render_kwargs or {})}
+    _check_picture(env.physics.model, **rendering)
+    super().__init__(env, render_mode, rendering)
     # Of these copies are made anew, not of shimmy's arguments.
     gymnasium.utils.EzPickle.__init__(
       self, task, render_mode, render_kwargs, **options
@@ -69,7 +72,12 @@ class BlockEnvironment(DmControlCompatibilityV0):
   def reset(
     self, *, seed: int | None = None, options: dict[str, Any] | None = None
   ) -> tuple[Any, dict[str, Any]]:
-    """Starts an episode; `options` are the arguments of `reset_to`."""
+    """Starts an episode; `options` are the arguments of `reset_to`.
+
+    Raises ValueError if one of them is wrong.
+    """
+    arguments = inspect.signature(self._env.reset_to).parameters
+    _check("options", options or (), arguments)
     gymnasium.Env.reset(self, seed=seed)
     if seed is not None:
       # Gymnasium's may be of any size; ours are of 32 bits.
@@ -114,6 +122,29 @@ class BlockEnvironment(DmControlCompatibilityV0):
       "conditions": lfgp_dmc.conditions(timestep.observation),
       "physics_failure": bool(timestep.last() and timestep.discount == 0),
     }
+
+
+def _check(what: str, given: Iterable, valid: Iterable) -> None:
+  """Raises ValueError that names what of `given` is not valid, and what is."""
+  valid = list(valid)
+  if wrong := [one for one in given if one not in valid]:
+    names = ", ".join(map(str, valid))
+    raise ValueError(f"unknown {what} {wrong[0]!r}; valid: {names}")
+
+
+def _check_picture(
+  model, height: int, width: int, camera_id: int | str
+) -> None:
+  """Raises ValueError if the model has no such camera, or no room for it."""
+  cameras = [model.id2name(i, "camera") for i in range(model.ncam)]
+  _check("camera_id", [camera_id], [*cameras, *range(-1, model.ncam)])
+  room = model.vis.global_
+  for name, size, most in (
+    ("height", height, room.offheight),
+    ("width", width, room.offwidth),
+  ):
+    if not 0 < size <= most:
+      raise ValueError(f"render_kwargs: {name} is {size}; valid: 1 to {most}")
 
 
 def _without_tasks(named) -> dict[str, Any]:

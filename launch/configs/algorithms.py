@@ -10,12 +10,14 @@ from lfgp_dmc.agents.lfgp import LfgpConfig
 from lfgp_dmc.agents.parts import AgentParts
 from lfgp_dmc.types import ActingAgent, SupervisedAgent
 
+AgentConfig = LfgpConfig | BcConfig  # what `RunConfig.agent` may be
+
 
 @dataclasses.dataclass(frozen=True)
 class Algorithm:
   """How an algorithm is made from a run's config."""
 
-  agent_config: type[LfgpConfig] | type[BcConfig]
+  agent_config: type[AgentConfig]
   build: Callable[[Any, AgentParts], ActingAgent | SupervisedAgent]
   # Config fields by dotted name, and groups that presets leave alone.
   defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)

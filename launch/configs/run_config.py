@@ -5,7 +5,6 @@ from typing import Any
 
 from pydantic import model_validator
 
-from lfgp_dmc.agents.bc import BcConfig
 from lfgp_dmc.agents.fields import (
   Count,
   Positive,
@@ -16,6 +15,7 @@ from lfgp_dmc.agents.fields import (
   checked,
 )
 from lfgp_dmc.agents.lfgp import LfgpConfig
+from lfgp_dmc.launch.configs.algorithms import AgentConfig
 from lfgp_dmc.launch.environment_spec import EnvironmentSpec
 from lfgp_dmc.task_names import ALL_TASKS, CONTROL_RATES
 
@@ -90,7 +90,7 @@ class RunConfig:
   cuda_graphs: Switch = True  # on a GPU: updates recorded, then replayed
   deterministic: Switch = False  # the same numbers again, after a resume too
 
-  agent: LfgpConfig | BcConfig = LfgpConfig()  # the algorithm's own settings
+  agent: AgentConfig = LfgpConfig()  # the algorithm's own settings
 
   @model_validator(mode="after")
   def _check_fields_together(self):

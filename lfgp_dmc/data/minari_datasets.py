@@ -64,9 +64,14 @@ def _check(data: Demonstrations, dataset_id: str) -> None:
       "letters, digits, - and _"
     ) from None
   path = get_dataset_path(dataset_id)
-  for place in (path, *(p for p in path.parents if (p / "data").exists())):
+  # A dataset is a folder with `data` in it; so may be what holds Minari's own.
+  root = get_dataset_path("")
+  around = [p for p in path.parents if root in p.parents]
+  for place in (path, *(p for p in around if (p / "data").exists())):
     if place.exists():
-      raise ValueError(f"the Minari dataset {place} exists; choose another")
+      raise ValueError(
+        f"the Minari dataset {place} exists; choose another, or delete it"
+      )
   if rows := jumps(data):
     raise ValueError(
       f"{dataset_id}: row {rows[0]} does not start where the row before ended; "
@@ -97,20 +102,26 @@ def from_minari(
       `control_hz`, over those that `to_minari` stored.
 
   Raises:
-    ValueError: there is no such dataset, or its observations or actions are
-      not flat floats.
+    ValueError: there is no such dataset, it is damaged, or its observations
+      or actions are not flat floats.
   """
   if dataset_id not in minari.list_local_datasets():
     raise ValueError(
       f"no local Minari dataset {dataset_id}; download it with: minari "
       f"download {dataset_id}"
     )
-  dataset = minari.load_dataset(dataset_id)
+  try:
+    dataset = minari.load_dataset(dataset_id)
+    episodes = [one for one in dataset.iterate_episodes() if len(one.actions)]
+  except (KeyError, OSError) as error:
+    place = get_dataset_path(dataset_id)
+    raise ValueError(
+      f"the Minari dataset {place} is damaged or unfinished: {error}"
+    ) from error
   for name in ("observation_space", "action_space"):
     space = getattr(dataset.spec, name)
     if not isinstance(space, gymnasium.spaces.Box) or len(space.shape) != 1:
       raise ValueError(f"{dataset_id}: {name} is {space}; valid: a flat Box")
-  episodes = [one for one in dataset.iterate_episodes() if len(one.actions)]
   if not episodes:
     raise ValueError(f"{dataset_id} holds no step")
   stored = dict(dataset.storage.metadata).get(_KEY, "{}")

@@ -36,6 +36,22 @@ class GymnasiumTest(parameterized.TestCase):
       env_checker.check_env(env.unwrapped, skip_render_check=True)
     env.close()
 
+  @parameterized.parameters(
+    ({"render_mode": "nope"}, "render_mode 'nope'; valid: None, rgb_array"),
+    ({"render_kwargs": {"fov": 4}}, "render_kwargs 'fov'; valid: height"),
+    ({"render_kwargs": {"camera_id": "x"}}, "camera_id 'x'; valid: .*quarter"),
+    ({"render_kwargs": {"height": 9000}}, "height is 9000; valid: 1 to "),
+  )
+  def test_what_no_picture_can_have_is_named(self, given, said):
+    with self.assertRaisesRegex(ValueError, said):
+      gymnasium.make(_IDS["reach"], **given)
+
+  def test_an_unknown_start_is_named(self):
+    env = gymnasium.make(_IDS["reach"])
+    with self.assertRaisesRegex(ValueError, "'red'; valid: tcp, blue, green"):
+      env.reset(options={"red": 1})
+    env.close()
+
   def test_ids_are_the_tasks_names_in_camel_case(self):
     self.assertEqual(_IDS["unstack_stack"], "lfgp_dmc/UnstackStack-v0")
 

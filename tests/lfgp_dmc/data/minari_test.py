@@ -14,6 +14,7 @@ if not importlib.util.find_spec("minari"):
   raise unittest.SkipTest("the extra minari is not installed")
 
 import gymnasium
+import h5py
 import minari
 from minari import data_collector
 
@@ -77,6 +78,24 @@ class MinariTest(fixtures.FolderTest):
     self.assertEqual(
       os.environ["MINARI_DATASETS_PATH"], str(self.folder / "minari")
     )
+
+  def test_a_folder_of_data_beside_the_store_is_none_of_it(self):
+    (self.folder / "data").mkdir()
+    data = fixtures.demonstrations(4, 1)
+    minari_datasets.to_minari({"ab/lift-v0": data})
+    self.assertLen(minari.list_local_datasets(), 1)
+
+  @parameterized.parameters("half a file", "no actions")
+  def test_a_damaged_dataset_is_named(self, damage):
+    minari_datasets.to_minari({"ab/lift-v0": fixtures.demonstrations(4, 1)})
+    stored = self.folder / "minari/ab/lift-v0/data/main_data.hdf5"
+    if damage == "no actions":
+      with h5py.File(stored, "a") as file:
+        del file["episode_0/actions"]
+    else:
+      stored.write_bytes(stored.read_bytes()[:3000])
+    with self.assertRaisesRegex(ValueError, "ab/lift-v0 is damaged or unfin"):
+      minari_datasets.from_minari("ab/lift-v0")
 
   def test_what_does_not_fit_is_named(self):
     data = fixtures.demonstrations(4, 1, 6)
