@@ -22,10 +22,8 @@ def check(config: configs.RunConfig, folder: files.Path) -> None:
   """
   disk = shutil.disk_usage(files.existing_parent(folder)).total
   fields = dict(configs.flattened(config.to_dict()))
-  width, rows = (
-    fields.get("agent.networks.hidden_size", 1),
-    config.replay_capacity,
-  )
+  rows = config.replay_capacity
+  width = fields.get("agent.networks.hidden_size", 1)
   of_algorithm = configs.ALGORITHMS[config.algorithm]
   tasks = 1
   if of_algorithm.is_multitask and not config.environment:

@@ -5,7 +5,7 @@ Importing this loads no simulator; building an environment does.
 
 import functools
 import numbers
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any
 
 from lfgp_dmc import graphics
@@ -84,13 +84,17 @@ def load(
   return environment
 
 
+def check_choice(name: str, given: Any, valid: Collection[Any]) -> None:
+  """Raises ValueError, with the valid ones, if `given` is none of them."""
+  if given not in valid:
+    names = ", ".join(map(str, valid))
+    raise ValueError(f"unknown {name} {given!r}; valid: {names}")
+
+
 def _check(given: Mapping[str, Any]) -> None:
   """Raises ValueError for the first option that is out of range."""
   for name, valid in _CHOICES.items():
-    if given[name] not in valid:
-      raise ValueError(
-        f"unknown {name} {given[name]!r}; valid: {', '.join(map(str, valid))}"
-      )
+    check_choice(name, given[name], valid)
   size = given["camera_size"]
   if not isinstance(size, numbers.Integral) or not 32 <= int(size) <= 480:
     raise ValueError(f"camera_size is {size!r}; valid: 32 to 480")

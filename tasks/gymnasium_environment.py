@@ -11,7 +11,6 @@ end them. After `reset(seed=...)` everything depends on the seed alone.
 """
 
 import inspect
-from collections.abc import Iterable
 from typing import Any
 
 import gymnasium
@@ -21,6 +20,7 @@ import lfgp_dmc
 from lfgp_dmc import graphics, seeding
 from lfgp_dmc.acting.environments import TASK_PREFIXES
 from lfgp_dmc.observations import OBSERVATION_SIZE
+from lfgp_dmc.tasks import check_choice
 
 graphics.choose_backend()  # before shimmy imports dm_control
 
@@ -51,8 +51,10 @@ class BlockEnvironment(DmControlCompatibilityV0):
     height, width and camera_id of pictures. Raises ValueError if an option is
     wrong, or pictures are wanted where none can be made.
     """
-    _check("render_mode", [render_mode], [None, *self.metadata["render_modes"]])
-    _check("render_kwargs", render_kwargs or (), _FIXED_RENDERING)
+    modes = (None, *self.metadata["render_modes"])
+    check_choice("render_mode", render_mode, modes)
+    for name in render_kwargs or ():
+      check_choice("render_kwargs", name, _FIXED_RENDERING)
     if render_mode and (fault := graphics.fault()):
       raise ValueError(fault)
     self.task_name, self._is_closed = task, False
@@ -76,8 +78,9 @@ class BlockEnvironment(DmControlCompatibilityV0):
 
     Raises ValueError if one of them is wrong.
     """
-    arguments = inspect.signature(self._env.reset_to).parameters
-    _check("options", options or (), arguments)
+    for name in options or ():
+      valid = inspect.signature(self._env.reset_to).parameters
+      check_choice("options", name, valid)
     gymnasium.Env.reset(self, seed=seed)
     if seed is not None:
       # Gymnasium's may be of any size; ours are of 32 bits.
@@ -124,20 +127,12 @@ class BlockEnvironment(DmControlCompatibilityV0):
     }
 
 
-def _check(what: str, given: Iterable, valid: Iterable) -> None:
-  """Raises ValueError that names what of `given` is not valid, and what is."""
-  valid = list(valid)
-  if wrong := [one for one in given if one not in valid]:
-    names = ", ".join(map(str, valid))
-    raise ValueError(f"unknown {what} {wrong[0]!r}; valid: {names}")
-
-
 def _check_picture(
   model, height: int, width: int, camera_id: int | str
 ) -> None:
   """Raises ValueError if the model has no such camera, or no room for it."""
   cameras = [model.id2name(i, "camera") for i in range(model.ncam)]
-  _check("camera_id", [camera_id], [*cameras, *range(-1, model.ncam)])
+  check_choice("camera_id", camera_id, [*cameras, *range(-1, model.ncam)])
   room = model.vis.global_
   for name, size, most in (
     ("height", height, room.offheight),
